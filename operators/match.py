@@ -7,7 +7,7 @@ from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatPrope
 
 from ..beyond_mocap.base.errors import InputError, format_count
 from ..beyond_mocap.base.fixes import Fix
-from ..beyond_mocap.files.tracking.providers import PROVIDERS
+from ..beyond_mocap.files.tracking import providers
 from ..scene.core import channels, session, window
 from ..scene.core.measure import frames_per_second
 from ..scene.core.settings import to_setting_path
@@ -93,8 +93,9 @@ select the first minute"""
         scene.beyond_mocap.task = "MATCH"
         for line in match.report.splitlines()[:6]:
             self.report({"INFO"}, line)
+        provider = providers.PROVIDERS.get(read.provider)
         self.report({"INFO"}, f"{format_count(len(read.players), 'player')}, {match.length_s / 60.0:.1f} minutes, "
-                    + (PROVIDERS[read.provider].title if read.provider in PROVIDERS else "skeletal tracking"))
+                    + (provider.title if provider is not None else "skeletal tracking"))
 
 
 class BEYOND_MOCAP_FH_match(ViewDropHandler, bpy.types.FileHandler):

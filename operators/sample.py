@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import bmesh
 import bpy
@@ -25,8 +25,7 @@ TILT = math.radians(70.0)  # of the free view, from straight down
 NLA_SHARE = 0.3  # of the 3D view's height, for the NLA editor
 
 
-@dataclass(frozen=True)
-class Sample:
+class Sample(NamedTuple):
     """The sample of one task.
 
     Attributes:

@@ -5,7 +5,7 @@ import numpy as np
 
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.base.settings.synthesis import MAX_SPEED
-from ..beyond_mocap.synthesis.pin import BALL
+from ..beyond_mocap.synthesis import pin as core_pin
 from ..scene.core import channels, window
 from ..scene.core.measure import units_per_metre
 from ..scene.core.settings import find_active_player, is_track
@@ -134,7 +134,7 @@ at the nearest key moment; move it with G, and set time and hold in the list of 
         scene, part = context.scene, self.part.replace("_", " ")
         channels.check_local(scene)
         player, now, hold = find_active_player(scene.beyond_mocap), pins.find_current_second(scene), self.hold
-        moment = ball_pins.find_ball_moment(scene, player, now) if part == BALL else None
+        moment = ball_pins.find_ball_moment(scene, player, now) if part == core_pin.BALL else None
         seconds, hold = (now, hold) if moment is None else (moment.time, 0.0)
         for other in player.pins:
             first, last = other.time - SAME, other.time + other.hold + SAME

@@ -11,8 +11,8 @@ The rule, which docs/reference/panel-guide.md tells in full:
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 ESSENTIAL = ("Distance to track", "Distance, 95 %", "Foot slide", "Slide per step", "Feet out of reach",
              "Lowest point", "Spins not asked for", "Second strikes", "Ball inside the body")  # seen at once
@@ -20,8 +20,7 @@ FAR = 1.5  # times its target, from where on a missed figure is poor
 GOOD_SHARE, POOR_SHARE = 0.1, 0.5  # of the targets are missed: at most, more than
 
 
-@dataclass(frozen=True)
-class Verdict:
+class Verdict(NamedTuple):
     """A verdict on a take.
 
     Attributes:

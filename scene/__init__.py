@@ -4,7 +4,8 @@ There is one package for each feature, described in its own docstring; docs/expl
 All use `core`: channels, clock, background work, settings, registration, and the one live watcher.
 """
 
-REGISTERED = ()
+REGISTERED = ("ball", "characters", "core", "library", "markers", "match", "overlays", "passes", "path_editing",
+              "player", "result", "rigs", "stage", "stream", "throws", "timeline")
 
 
 def register():

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from ..base.errors import InputError, build_read_error
 from . import event_data, tables
+from .provider_texts import EVENTS
 from .tracking import match_arrays
 from .tracking.feed import Provider, find_provider, load_with_kloppy, read_head
 
@@ -227,53 +228,47 @@ _ALONE, _WITH_METADATA = {"event_data": "events"}, {"event_data": "events", "met
 _WITH_LINEUPS = {"event_data": "events", "lineup_data": "meta"}
 _LINEUPS = (("events", "lineups"), ("event", "lineup"))
 
-# saved scenes store the position in this order: add new providers at the end
 EVENT_PROVIDERS: dict[str, EventProvider] = {record.name: record for record in (
     EventProvider(
-        name="opta", title="Opta", files="F24 or F73 with F7", renamed=(("f24", "f7"), ("F24", "F7"), ("f73", "f7")),
+        **EVENTS["opta"], renamed=(("f24", "f7"), ("F24", "F7"), ("f73", "f7")),
         patterns=(_XML + rb"(<!--.{0,400}?-->\s*)?<Games\b",), second_pattern=_XML + rb"<SoccerFeed\b",
         arguments={"f24_data": "events", "f7_data": "meta"},
     ),
     EventProvider(
-        name="sportec", title="Sportec (DFL)", files="events with the tracking's metadata",
-        patterns=(_XML + rb"<PutDataRequest\b.{0,2000}<Event\b",),
+        **EVENTS["sportec"], patterns=(_XML + rb"<PutDataRequest\b.{0,2000}<Event\b",),
         second_pattern=_XML + rb"<PutDataRequest\b.{0,900}<MatchInf", loader="load_event", arguments=_WITH_METADATA,
         renamed=(("events", "meta"), ("events_raw", "matchinformation")),
     ),
     EventProvider(
-        name="statsbomb", title="StatsBomb", files="events with their lineups", renamed=_LINEUPS,
+        **EVENTS["statsbomb"], renamed=_LINEUPS,
         patterns=(rb'(?s)\s*\[\s*\{.{0,600}"possession"',), second_pattern=rb'(?s)\s*\[\s*\{.{0,300}"lineup"',
         arguments=_WITH_LINEUPS,
     ),
     EventProvider(
-        name="metrica", title="Metrica", files="events with the tracking's metadata; CSV alone",
-        patterns=(rb"Team,Type,Subtype,Period", rb'(?s)\s*\{\s*"data"\s*:\s*\[.{0,600}"subtypes"'),
+        **EVENTS["metrica"], patterns=(rb"Team,Type,Subtype,Period", rb'(?s)\s*\{\s*"data"\s*:\s*\[.{0,600}"subtypes"'),
         second_pattern=_XML + rb"<main\b.{0,900}<Metadata\b", loader="load_event", arguments=_WITH_METADATA,
         renamed=(("events", "metadata"), ("events.json", "metadata.xml")), read_table=read_metrica_events,
     ),
     EventProvider(
-        name="wyscout", title="Wyscout", files="alone (2 and 3)", arguments=_ALONE,
+        **EVENTS["wyscout"], arguments=_ALONE,
         patterns=(rb'(?s)\s*\{.{0,4000}("eventSec"|"matchTimestamp")',),
     ),
     EventProvider(
-        name="datafactory", title="DataFactory", files="alone", arguments=_ALONE,
+        **EVENTS["datafactory"], arguments=_ALONE,
         patterns=(rb'(?s)\s*\{\s*"match"\s*:\s*\{.{0,600}"homeTeamId"',),
     ),
     EventProvider(
-        name="statsperform", title="Stats Perform", files="MA3 with MA1", renamed=(("ma3", "ma1"), ("MA3", "MA1")),
+        **EVENTS["statsperform"], renamed=(("ma3", "ma1"), ("MA3", "MA1")),
         patterns=(_XML + rb"<matchEvents\b", rb'(?s)\s*\{\s*"matchInfo"'),
         second_pattern=_XML + rb'(<match\b|\{.{0,9000}"(lineUp|liveData)")', loader="load_event",
         arguments={"ma3_data": "events", "ma1_data": "meta"},
     ),
     EventProvider(
-        name="impect", title="Impect", files="events with their lineups", renamed=_LINEUPS, arguments=_WITH_LINEUPS,
+        **EVENTS["impect"], renamed=_LINEUPS, arguments=_WITH_LINEUPS,
         patterns=(rb'(?s)\s*\[\s*\{.{0,400}"gameTimeInSec"',), second_pattern=rb'(?s)\s*\{.{0,900}"squadHome"',
         has_foot_side=False,
     ),
     EventProvider(
-        name="csv", title="CSV",
-        files="`time_s,type,player[,detail,success,x,y,period,part,side]`, seconds of the match, or of the period "
-              "where a column names it",
-        patterns=(rb"[^\r\n{<\[]{0,400}time_s",), read_table=read_plain_events,
+        **EVENTS["csv"], patterns=(rb"[^\r\n{<\[]{0,400}time_s",), read_table=read_plain_events,
     ),
 )}  # fmt: skip

@@ -1,8 +1,7 @@
 """Motion clips in the scene: import them, mirror them, make assets of them."""
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import bpy
 import numpy as np
@@ -149,8 +148,7 @@ CLIP_CHOICES = (("CHOSEN", "Chosen Clip", "The clip chosen in the library's list
                 ("SELECTED", "Selected Armatures", "The actions that the selected armatures play"))
 
 
-@dataclass(frozen=True, eq=False)
-class AssetOrder:
+class AssetOrder(NamedTuple):
     """The input of making assets.
 
     Attributes:

@@ -2,8 +2,7 @@
 
 import os
 from collections import Counter
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
@@ -46,8 +45,7 @@ class ClipOperator(BaseOperator):
         return path
 
 
-@dataclass(frozen=True)
-class BuildOrder:
+class BuildOrder(NamedTuple):
     """The input of a build."""
 
     setting: str
@@ -57,8 +55,7 @@ class BuildOrder:
     preferences: dict  # arguments of the core's build
 
 
-@dataclass(frozen=True, eq=False)
-class BuildResult:
+class BuildResult(NamedTuple):
     """The result of a build.
 
     Attributes:
@@ -222,8 +219,7 @@ def describe_gaps(library: "Library") -> str:
     return "\n".join([", ".join(parts), *library.proposal_notes, *missing, *left_out]) if parts else ""
 
 
-@dataclass(frozen=True, eq=False)
-class ListOrder:
+class ListOrder(NamedTuple):
     """The folder to list, and its library if it was built in this session."""
 
     setting: str

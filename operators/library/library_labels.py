@@ -1,7 +1,7 @@
 """Labels of a library clip: open it for annotation, propose labels, review and save them, learn from them."""
 
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
@@ -295,8 +295,7 @@ table; existing labels are replaced only after you confirm"""
                     "Library to use the labels")
 
 
-@dataclass(frozen=True)
-class LearnOrder:
+class LearnOrder(NamedTuple):
     """The input of learning.
 
     Attributes:

@@ -43,7 +43,7 @@ _timers: dict[Callable, Callable] = {}  # action -> the function that Blender ca
 _reported: set[tuple] = set()
 
 
-@dataclass(eq=False, kw_only=True)
+@dataclass(eq=False, repr=False, kw_only=True)
 class Watcher:
     """What one feature watches, and what it does then. It has at most one of `follow`, `settle` and `look`.
 

@@ -6,7 +6,7 @@ The scene decides; nothing here changes its frame rate or unit scale.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -29,8 +29,7 @@ def whole_frames(start: float, duration: float, fps: float) -> np.ndarray:
     return np.arange(first, max(first, last) + 1)
 
 
-@dataclass(frozen=True)
-class Clock:
+class Clock(NamedTuple):
     """A clock that shows `start_time` seconds on frame `start_frame`, at `fps` frames per second."""
 
     start_frame: float

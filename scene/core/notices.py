@@ -50,7 +50,7 @@ class BeyondMocapNotices(bpy.types.PropertyGroup):
     shown: IntProperty(description="Number of the first notice that the pop-up shows")
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Subject:
     """What a notice is about.
 

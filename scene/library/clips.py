@@ -11,7 +11,7 @@ as a whole still finds its library.
 import math
 import os
 import threading
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,12 +37,12 @@ SCAN_INTERVAL = 4.0  # seconds between two scans of the folder
 _scan_state: dict = {}  # the scanning thread and its result
 
 
-@dataclass
 class _Listing:
     """The last listing: the clips, and the files at that time (`list_files`)."""
 
-    clips: "tuple[ListedClip, ...]" = ()
-    files: dict[str, tuple[int, int]] = field(default_factory=dict)
+    def __init__(self):
+        self.clips: tuple[ListedClip, ...] = ()
+        self.files: dict[str, tuple[int, int]] = {}
 
 
 def _on_filter_change(_self, context):

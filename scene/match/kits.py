@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -28,8 +28,7 @@ KIT_PARTS = ("shirt", "shorts", "socks", "trim", "number")
 BRIGHT_LUMINANCE = 0.35  # luminance from which a shirt gets a dark number and dark shorts
 
 
-@dataclass(frozen=True)
-class Kit:
+class Kit(NamedTuple):
     """The colours of a kit, linear RGB.
 
     Attributes:

@@ -14,8 +14,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from ...beyond_mocap.files.event_providers import EVENT_PROVIDERS
-from ...beyond_mocap.files.tracking.providers import PROVIDERS
+from ...beyond_mocap.files.provider_texts import EVENTS, TRACKING
 from ..characters.settings import is_original
 from ..core.properties import with_settings
 from . import kits
@@ -23,9 +22,9 @@ from . import kits
 FILE = {"subtype": "FILE_PATH", "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}}
 AUTO = "AUTO"
 DETECT_ITEM = (AUTO, "Automatic", "Detect the provider from the file")
-PROVIDER_ITEMS = [DETECT_ITEM, *((one.name, one.title, one.files.replace("`", "")) for one in PROVIDERS.values())]
-EVENT_PROVIDER_ITEMS = [DETECT_ITEM, *((one.name, one.title, one.files.replace("`", ""))
-                                       for one in EVENT_PROVIDERS.values())]
+PROVIDER_ITEMS, EVENT_PROVIDER_ITEMS = (
+    [DETECT_ITEM, *((one["name"], one["title"], one["files"].replace("`", "")) for one in texts.values())]
+    for texts in (TRACKING, EVENTS))
 COLOUR = {"subtype": "COLOR", "size": 3, "min": 0.0, "max": 1.0}
 CHARACTER_GROUPS = ("home", "away", "referee", "keeper")
 TEAM_ITEMS = (("home", "Home", "The home team"), ("away", "Away", "The away team"), ("referee", "Referee", "Referees"))

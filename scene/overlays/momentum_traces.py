@@ -7,9 +7,8 @@ user is idle after a change; why it cannot be is stored with the armature for th
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import bpy
 
@@ -25,8 +24,7 @@ if TYPE_CHECKING:
 _WATCHED = (bpy.types.Object, bpy.types.Armature, bpy.types.Action, bpy.types.Scene)
 
 
-@dataclass(frozen=True, eq=False)
-class ShownMomentum:
+class ShownMomentum(NamedTuple):
     """The trace of an armature's motion.
 
     Attributes:

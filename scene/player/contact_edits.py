@@ -2,7 +2,8 @@
 the newest take they belong to.
 """
 
-from dataclasses import dataclass
+
+from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -37,8 +38,7 @@ class BeyondMocapContactEdit(bpy.types.PropertyGroup):
                                 description="Metres by which the contact is moved on the ground")
 
 
-@dataclass(frozen=True, eq=False)
-class Contact:
+class Contact(NamedTuple):
     """A contact of a take's foot.
 
     Attributes:

@@ -6,7 +6,7 @@ of speed 0 its Weight: both stay with the point when the curve is subdivided or 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -27,8 +27,7 @@ BEZIER_PIECES = 48  # straight pieces of a Bezier segment
 LABEL_SIZE, RGBA, PIN_RGBA = 12, (1.0, 0.85, 0.2, 1.0), (0.4, 0.9, 1.0, 1.0)
 
 
-@dataclass(frozen=True, eq=False)
-class DrawnLine:
+class DrawnLine(NamedTuple):
     """A curve on the ground.
 
     Attributes:

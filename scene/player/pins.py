@@ -6,7 +6,7 @@ from bpy.props import EnumProperty, FloatProperty, PointerProperty
 
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import humanoid
-from ...beyond_mocap.synthesis.pin import BALL, Pin
+from ...beyond_mocap.synthesis import pin as core_pin
 from ..core import window
 from ..core.measure import build_scene_clock, units_per_metre
 from ..rigs import armature
@@ -16,7 +16,7 @@ PARTS = (("left_hand", "Left Hand", "Pin the wrist of the left hand", "VIEW_PAN"
          ("left_foot", "Left Foot", "Pin the ankle of the left foot", "MOD_DYNAMICPAINT", 2),
          ("right_foot", "Right Foot", "Pin the ankle of the right foot", "MOD_DYNAMICPAINT", 3),
          ("gaze", "Gaze", "Pin the point that the player looks at", "HIDE_OFF", 4),
-         (BALL, "Ball", "Pin the ball at the nearest key moment at which the player meets it", "MESH_UVSPHERE", 5))
+         ("ball", "Ball", "Pin the ball at the nearest key moment at which the player meets it", "MESH_UVSPHERE", 5))
 SIZE = 0.12  # metres, just larger than the ball
 GAZE_DISTANCE = 3.0  # metres in front of the head at which a new gaze pin is placed
 
@@ -33,15 +33,15 @@ class BeyondMocapPin(bpy.types.PropertyGroup):
                         description="Duration for which the part stays there; 0 for a moment, as always for the ball")
 
 
-def read_pins(scene: bpy.types.Scene, player) -> tuple[Pin, ...]:
+def read_pins(scene: bpy.types.Scene, player) -> "tuple[core_pin.Pin, ...]":
     """Read a player's pins whose Empties are in the scene."""
     metres = 1.0 / units_per_metre(scene)
     found = []
     for pin in player.pins:
         if pin.target is not None and pin.target.name in scene.objects:
             place = np.array(pin.target.matrix_world.translation, dtype=float) * metres
-            hold = 0.0 if pin.part == BALL else round(pin.hold, 6)
-            found.append(Pin(round(pin.time, 6), pin.part, tuple(np.round(place, 6)), hold))
+            hold = 0.0 if pin.part == "ball" else round(pin.hold, 6)
+            found.append(core_pin.Pin(round(pin.time, 6), pin.part, tuple(np.round(place, 6)), hold))
     return tuple(found)
 
 

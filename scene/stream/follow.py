@@ -33,7 +33,7 @@ STATUS_SECONDS = 0.25  # s between two status updates
 MOST_BODIES = 20  # characters created in one stream: a sender that keeps changing its skeleton is stopped
 
 
-@dataclass(eq=False, kw_only=True)
+@dataclass(eq=False, repr=False, kw_only=True)
 class ReceivedStream:
     """A stream that is received.
 

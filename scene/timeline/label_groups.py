@@ -6,9 +6,8 @@ The colours are those of the 3D view's overlays: a strike is green there and her
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..overlays import colours
 
@@ -27,8 +26,7 @@ FAST, DARKEST = 5.5, 0.5  # m/s of a sprint; share of black in the colour of who
 Colour = tuple[float, float, float]
 
 
-@dataclass(frozen=True)
-class LabelGroup:
+class LabelGroup(NamedTuple):
     """A kind of action.
 
     Attributes:

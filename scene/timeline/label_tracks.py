@@ -6,7 +6,7 @@ which its frames were written, so that another frame rate of the scene does not 
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import bpy
 from bpy.props import StringProperty
@@ -26,8 +26,7 @@ class BeyondMocapLanes(bpy.types.PropertyGroup):
     clock: StringProperty(name="Clock", description="Start frame, its second and the frames per second of these strips")
 
 
-@dataclass(frozen=True)
-class PlacedSpan:
+class PlacedSpan(NamedTuple):
     """A span and its strip.
 
     Attributes:
@@ -51,8 +50,7 @@ class PlacedSpan:
     is_selected: bool = False
 
 
-@dataclass(frozen=True)
-class PlacedMoment:
+class PlacedMoment(NamedTuple):
     """A key moment and its marker.
 
     Attributes:

@@ -7,6 +7,7 @@ All rectangles and diamonds of an editor are one batch, so that a hundred strips
 from __future__ import annotations
 
 import time
+from typing import TYPE_CHECKING
 
 import blf
 import bpy
@@ -15,21 +16,14 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 
 from ..core.live import Watcher, call_guarded, call_soon, is_running
+from . import label_groups as groups
+from . import moment_names as names
 from . import strip_layout, timeline_texts
-from .label_groups import AUTOMATIC, GROUPS, LabelGroup, choose_ink, elide, mix
-from .moment_names import (
-    DIAMOND,
-    GAP,
-    PAD,
-    TEXT,
-    TOP,
-    DrawnName,
-    find_frame_pixels,
-    is_visible,
-    measure,
-    redraw_editors,
-)
-from .strip_layout import DrawnStrip, Layout
+
+if TYPE_CHECKING:
+    from .label_groups import LabelGroup
+    from .moment_names import DrawnName
+    from .strip_layout import DrawnStrip, Layout
 
 DRAGGING = ("TRANSFORM_OT_", "NLA_OT_", "BEYOND_MOCAP_OT_pick_moment")
 FOOT = 21  # points: lower edge of the line with keys and legend
@@ -115,13 +109,13 @@ def _end_hover() -> float | None:
     if wait > 0.1:
         return wait
     _hover.clear()
-    redraw_editors()
+    names.redraw_editors()
     return None
 
 
 def _draw() -> None:
     context = bpy.context
-    if not is_visible(context):
+    if not names.is_visible(context):
         return
     region, canvas = context.region, Canvas()
     if context.area.type == "NLA_EDITOR":
@@ -148,10 +142,10 @@ class Look:
     def __init__(self, context: bpy.types.Context):
         theme = context.preferences.themes[0].nla_editor
         self.scale = context.preferences.system.ui_scale
-        self.width, self.height = context.region.width, context.region.height - TOP * self.scale
-        self.shift, self.per_frame = find_frame_pixels(context.region)
+        self.width, self.height = context.region.width, context.region.height - names.TOP * self.scale
+        self.shift, self.per_frame = names.find_frame_pixels(context.region)
         self.back = tuple(theme.space.back)[:3]
-        self.ink = choose_ink(self.back)
+        self.ink = groups.choose_ink(self.back)
         self.selected = tuple(theme.strips_selected)[:3]
 
     def compute_baseline(self, bottom: float, top: float, size: float) -> float:
@@ -163,18 +157,18 @@ def _add_lanes(canvas: Canvas, layout: Layout, look: Look) -> None:
     """Cover the rows of the dots' own keys with a calm bar."""
     for target, (left, bottom, right, top) in layout.lanes:
         top = min(top, look.height)
-        canvas.add_box((left, bottom, right, top), mix(look.back, look.ink, 0.07))
+        canvas.add_box((left, bottom, right, top), groups.mix(look.back, look.ink, 0.07))
         size = SMALL * look.scale
         text, first = timeline_texts.describe_track(target)
         if top - bottom > size:
-            x = min(max(look.shift + look.per_frame * first, 0.0), look.width) + PAD * look.scale
+            x = min(max(look.shift + look.per_frame * first, 0.0), look.width) + names.PAD * look.scale
             canvas.add_text((x, look.compute_baseline(bottom, top, size)), text, size, look.ink, 0.55)
 
 
 def _cover_dragged(canvas: Canvas, layout: Layout, look: Look) -> None:
     """Cover what Blender draws beside strips while they are dragged: it holds them to both ends of their row."""
     for bottom, top in {(strip.box[1], strip.box[3]) for strip in layout.strips if strip.is_selected}:
-        canvas.add_box((0.0, bottom, look.width, min(top, look.height)), mix(look.back, look.ink, 0.03))
+        canvas.add_box((0.0, bottom, look.width, min(top, look.height)), groups.mix(look.back, look.ink, 0.03))
 
 
 def _add_strip(canvas: Canvas, strip: DrawnStrip, look: Look) -> None:
@@ -186,46 +180,46 @@ def _add_strip(canvas: Canvas, strip: DrawnStrip, look: Look) -> None:
     dim = strip.is_muted or strip.kind == "automatic"
     is_lane = strip.kind == "moments"
     colour = strip.colour
-    paper = mix(look.back, look.ink, 0.14) if is_lane else mix(look.back, colour, 0.4) if dim else colour
+    paper = groups.mix(look.back, look.ink, 0.14) if is_lane else groups.mix(look.back, colour, 0.4) if dim else colour
     canvas.add_box(box, paper)
     if dim and not is_lane:
         canvas.add_box((box[0], box[1], min(box[0] + 3 * look.scale, box[2]), box[3]), colour)
     if strip.is_selected and not is_lane:
-        canvas.add_frame(box, EDGE * look.scale + 1, choose_ink(paper))
+        canvas.add_frame(box, EDGE * look.scale + 1, groups.choose_ink(paper))
     if strip.is_selected:
         canvas.add_frame(box, EDGE * look.scale, look.selected)
     if not is_lane:
-        size, pad = TEXT * look.scale, (PAD + 2 * dim) * look.scale
+        size, pad = names.TEXT * look.scale, (names.PAD + 2 * dim) * look.scale
         room = box[2] - box[0] - 2 * pad
-        text = elide(strip.name, room, lambda part: measure(part, size)) if room > size else ""
-        canvas.add_text((box[0] + pad, look.compute_baseline(box[1], box[3], size)), text, size, choose_ink(paper),
-                        0.8 if dim else 1.0)
+        text = groups.elide(strip.name, room, lambda part: names.measure(part, size)) if room > size else ""
+        canvas.add_text((box[0] + pad, look.compute_baseline(box[1], box[3], size)), text, size,
+                        groups.choose_ink(paper), 0.8 if dim else 1.0)
 
 
 def _add_moment(canvas: Canvas, name: DrawnName, look: Look) -> None:
     """Add a key moment: its diamond and the name beside it, or its name at the foot with a line up to it."""
-    size, colour = TEXT * look.scale, name.colour
+    size, colour = names.TEXT * look.scale, name.colour
     alpha = 0.5 if name.is_muted else 1.0
     if name.is_at_foot:
         left, bottom, right, top = name.box
-        reached = look.height if name.y is None else name.y - DIAMOND * look.scale
+        reached = look.height if name.y is None else name.y - names.DIAMOND * look.scale
         canvas.add_box((name.x - 0.5 * look.scale, top, name.x + 0.5 * look.scale, reached), colour, 0.35 * alpha)
         if name.is_selected:
             canvas.add_box((left - EDGE, bottom - EDGE, right + EDGE, top + EDGE), look.selected)
         canvas.add_box(name.box, PAPER)
         canvas.add_box((left, bottom, left + 3 * look.scale, top), colour, alpha)
-        canvas.add_text((left + PAD * look.scale, look.compute_baseline(bottom, top, size)), name.text, size,
+        canvas.add_text((left + names.PAD * look.scale, look.compute_baseline(bottom, top, size)), name.text, size,
                         (1.0, 0.6, 0.5) if name.has_problem else INK, alpha)
     elif name.y is not None and name.box[3] < look.height:
-        half = DIAMOND * look.scale
+        half = names.DIAMOND * look.scale
         canvas.add_diamond(name.x, name.y, half + (3.0 if name.is_selected else 1.5) * look.scale,
                            look.selected if name.is_selected else (0.9, 0.1, 0.1) if name.has_problem else PAPER)
-        canvas.add_diamond(name.x, name.y, half, mix(look.back, colour, alpha))
+        canvas.add_diamond(name.x, name.y, half, groups.mix(look.back, colour, alpha))
         small = SMALL * look.scale
-        canvas.add_text((name.x - 0.5 * measure(name.letter, small), round(name.y - 0.36 * small)), name.letter, small,
-                        choose_ink(mix(look.back, colour, alpha)))
-        canvas.add_text((name.box[0] + (2 * DIAMOND + GAP) * look.scale, round(name.y - 0.35 * size)), name.text, size,
-                        look.ink, alpha)
+        canvas.add_text((name.x - 0.5 * names.measure(name.letter, small), round(name.y - 0.36 * small)), name.letter,
+                        small, groups.choose_ink(groups.mix(look.back, colour, alpha)))
+        canvas.add_text((name.box[0] + (2 * names.DIAMOND + names.GAP) * look.scale, round(name.y - 0.35 * size)),
+                        name.text, size, look.ink, alpha)
 
 
 def _add_foot(canvas: Canvas, context, layout: Layout, look: Look) -> None:
@@ -233,14 +227,14 @@ def _add_foot(canvas: Canvas, context, layout: Layout, look: Look) -> None:
     size, scale = SMALL * look.scale, look.scale
     baseline, x = FOOT * scale + 4 * scale, look.width - 18 * scale
     for group in reversed(_list_groups(layout)):
-        width = measure(group.title, size) + 26 * scale
+        width = names.measure(group.title, size) + 26 * scale
         if x - width < 0:
             break
         x -= width
         canvas.add_diamond(x + 7 * scale, baseline + 0.35 * size, 5.5 * scale, group.colour)
         canvas.add_text((x + 15 * scale, baseline), group.title, size, look.ink, 0.75)
     hints = timeline_texts.list_keys(context.area.type)
-    while hints and measure("    ".join(hints), size) > x - 24 * scale:
+    while hints and names.measure("    ".join(hints), size) > x - 24 * scale:
         hints = hints[:-1]
     canvas.add_text((8 * scale, baseline), "    ".join(hints), size, look.ink, 0.6)
 
@@ -248,7 +242,7 @@ def _add_foot(canvas: Canvas, context, layout: Layout, look: Look) -> None:
 def _list_groups(layout: Layout) -> list[LabelGroup]:
     """List the groups in view, in the order of the legend."""
     seen = {one.group for one in layout.names} | {one.group for one in layout.strips if one.kind != "moments"}
-    return [group for group in GROUPS if group in seen and group is not AUTOMATIC]
+    return [group for group in groups.GROUPS if group in seen and group is not groups.AUTOMATIC]
 
 
 def _add_note(canvas: Canvas, context, layout: Layout, look: Look) -> None:
@@ -266,13 +260,13 @@ def _add_note(canvas: Canvas, context, layout: Layout, look: Look) -> None:
 
 def _add_lines(canvas: Canvas, lines: list[str], place: tuple[float, float], look: Look) -> None:
     """Add lines of text in a dark box above a place, within the editor."""
-    size, pad = TEXT * look.scale, 6 * look.scale
-    width = max(measure(line, size) for line in lines) + 2 * pad
+    size, pad = names.TEXT * look.scale, 6 * look.scale
+    width = max(names.measure(line, size) for line in lines) + 2 * pad
     height = len(lines) * 1.45 * size + 2 * pad
     left = max(min(place[0], look.width - width - 20 * look.scale), 2.0)
     bottom = place[1] + 14 * look.scale
     bottom = bottom if bottom + height < look.height else max(place[1] - height - 14 * look.scale, 2.0)
-    canvas.add_box((left - 1, bottom - 1, left + width + 1, bottom + height + 1), mix(PAPER, INK, 0.35))
+    canvas.add_box((left - 1, bottom - 1, left + width + 1, bottom + height + 1), groups.mix(PAPER, INK, 0.35))
     canvas.add_box((left, bottom, left + width, bottom + height), PAPER)
     for number, line in enumerate(lines):
         canvas.add_text((left + pad, bottom + height - pad - (1.45 * number + 1.05) * size), line, size, INK,

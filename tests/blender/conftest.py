@@ -80,12 +80,15 @@ def extension():
 
 
 @pytest.fixture(scope="session", autouse=True)
-def work_cache(extension):
-    """What the core works out again and again is worked out once for the same order."""
+def work_cache(extension, tmp_path_factory):
+    """What the core works out again and again is worked out once for the same order; in `make test` for all runs."""
     import cached_work
 
+    shared = os.environ.get("TESTS_CACHE")
+    folder = pathlib.Path(shared, "work") if shared else None
     with pytest.MonkeyPatch.context() as monkeypatch:
-        yield cached_work.cache_functions(monkeypatch, f"{EXTENSION}.beyond_mocap")
+        yield cached_work.cache_functions(monkeypatch, f"{EXTENSION}.beyond_mocap", tmp_path_factory.getbasetemp(),
+                                          folder)
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -37,7 +37,7 @@ HOLDS = (
 )
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Setting:
     """One row of the settings table.
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...base.errors import InputError, build_read_error, format_count
+from ..provider_texts import TRACKING
 from .feed import MAX_PLAYERS, Feed, Files, TrackingProvider, find_provider, is_track_csv, load_with_kloppy, read_head
 from .referees import read_signality_referees, read_sportec_referees, read_tracab_referees
 
@@ -272,90 +273,76 @@ def _find_hawkeye(path: Path, meta: Path | None, notes: list[str]) -> Files:
     return (*players, *balls), (meta,) if meta else ()
 
 
-# saved scenes store the position in this order: add new providers at the end
 PROVIDERS: dict[str, TrackingProvider] = {record.name: record for record in (
     TrackingProvider(
-        name="tracab", title="TRACAB", files="`.dat` or `.json`, metadata `.xml` or `.json`; referees too",
-        patterns=(rb"\s*\d+:-?\d+,-?\d+,-?\d+,-?\d+,-?\d+,", rb'\s*\{[^{]{0,200}"FrameData"'),
+        **TRACKING["tracab"], patterns=(rb"\s*\d+:-?\d+,-?\d+,-?\d+,-?\d+,-?\d+,", rb'\s*\{[^{]{0,200}"FrameData"'),
         read_referees=read_tracab_referees,
     ),
     TrackingProvider(
-        name="metrica", title="Metrica", files="CSV, a file per team; or EPTS text with its XML",
+        **TRACKING["metrica"],
         patterns=(rb"(?i)\s*,,,(Home|Away|[^,\r\n]*),", rb"(?i)\s*\d+:(-?\d*\.\d+|NaN),(-?\d*\.\d+|NaN)"),
         renamed=(("Home", "Away"), ("home", "away"), ("Away", "Home"), ("away", "home")),
         find_files=_find_metrica, loader="load_tracking_epts", team_loader="load_tracking_csv",
     ),
     TrackingProvider(
-        name="skillcorner", title="SkillCorner", files="`.json` or `.jsonl` with the match's JSON",
+        **TRACKING["skillcorner"],
         renamed=(("tracking_extrapolated.jsonl", "match.json"), ("tracking.jsonl", "match.json"),
                  ("structured_data", "match_data")), metadata_kinds=(".json",),
         patterns=(rb'(?s)\s*[\[{].{0,4000}("trackable_object"|"image_corners_projection"|"player_data")',),
     ),
     TrackingProvider(
-        name="sportec", title="Sportec (DFL)",
-        files="positions XML with the match information XML; referees, colours of shirts",
-        patterns=(rb"(?s)\s*<.{0,4000}<Positions\b",), loader="load_tracking",
+        **TRACKING["sportec"], patterns=(rb"(?s)\s*<.{0,4000}<Positions\b",), loader="load_tracking",
         number_in_tracking=_find_sportec_number, number_in_metadata=_find_sportec_number,
         read_referees=read_sportec_referees,
     ),
     TrackingProvider(
-        name="secondspectrum", title="Second Spectrum",
-        files="`.jsonl` with its XML (a JSON of the same name brings names), or with its JSON",
+        **TRACKING["secondspectrum"],
         patterns=(rb'(?s)\s*\{(?!.{0,400}"gameRefId").{0,4000}"homePlayers"',), find_files=_find_secondspectrum,
         arguments={"meta_data": "meta", "raw_data": "raw", "additional_meta_data": "more"}, has_own_roster=True,
     ),
     TrackingProvider(
-        name="statsperform", title="Stats Perform", files="MA25 text with MA1", patterns=(rb"\s*\d{10,};\d",),
+        **TRACKING["statsperform"], patterns=(rb"\s*\d{10,};\d",),
         loader="load_tracking", coordinates="sportvu", has_pitch_size=False,
         arguments={"ma1_data": "meta", "ma25_data": "raw", "pitch_length": "length", "pitch_width": "width"},
     ),
     TrackingProvider(
-        name="pff", title="PFF",
-        files="`.jsonl`, metadata, and the roster (in the same folder, or in one with `roster` in its name); colours "
-              "of shirts",
-        patterns=(rb'(?s)\s*\{.{0,400}"gameRefId"',), find_files=_find_pff, loader="load_tracking",
+        **TRACKING["pff"], patterns=(rb'(?s)\s*\{.{0,400}"gameRefId"',), find_files=_find_pff, loader="load_tracking",
         metadata_kinds=(".json",),
         arguments={"meta_data": "meta", "raw_data": "raw", "roster_meta_data": "more"},
         number_in_tracking=partial(_find_number, rb'"gameRefId"\s*:\s*"?(\d+)'), number_in_metadata=_find_pff_number,
     ),
     TrackingProvider(
-        name="signality", title="Signality",
-        files="`..p1...json` (the other half is found by its name), metadata, and the file with `venue` in its "
-              "name; referees",
+        **TRACKING["signality"],
         patterns=(rb'(?s)\s*\[\s*\{.{0,400}"utc_time"',), find_files=_find_signality, metadata_kinds=(".json",),
         arguments={"meta_data": "meta", "raw_data_feeds": "all", "venue_information": "more"},
         read_referees=read_signality_referees,
     ),
     TrackingProvider(
-        name="hawkeye", title="HawkEye",
-        files="any file of a folder: all its `.samples.centroids` and `.samples.ball` are used; metadata if there is "
-              "any",
+        **TRACKING["hawkeye"],
         patterns=(rb'(?s)\s*\{\s*"details"\s*:.{0,4000}"heId"',), find_files=_find_hawkeye, needs_metadata=False,
         arguments={"player_centroid_feeds": "first", "ball_feeds": "second", "meta_data": "meta",
                    "pitch_length": "length", "pitch_width": "width"},
     ),
     TrackingProvider(
-        name="cdf", title="Common Data Format", files="`tracking.jsonl` with its metadata",
+        **TRACKING["cdf"],
         patterns=(rb'(?s)\s*\{\s*"frame_id"(?!.{0,2000}"landmarks").{0,600}"teams"\s*:\s*\{\s*"(home|away)"',),
         renamed=(("tracking.jsonl", "meta.json"), ("tracking.jsonl", "metadata.json")), metadata_kinds=(".json",),
         read_samples=_read_cdf,
     ),
     TrackingProvider(
-        name="respovision", title="ReSpo.Vision", files="`.jsonl`", needs_metadata=False, has_pitch_size=False,
+        **TRACKING["respovision"], needs_metadata=False, has_pitch_size=False,
         patterns=(rb'(?s)\s*\{.{0,300}"pitch_side"\s*:',), find_files=_find_alone, read_samples=_read_respovision,
     ),
     TrackingProvider(
-        name="soccernet", title="SoccerNet Game State", files="`Labels-GameState.json`, or predictions of its form",
+        **TRACKING["soccernet"],
         patterns=(rb'(?s)\s*\{.{0,4000}"bbox_pitch"', rb'(?s)\s*\{\s*"info"\s*:.{0,4000}"(im_dir|im_ext|seq_length)"'),
         needs_metadata=False, find_files=_find_alone, read_samples=_read_soccernet,
     ),
     TrackingProvider(
-        name="gps", title="GPS", files="CSV with latitude, longitude and time (Catapult, STATSports) or GPX, a file "
-        "for each player; the pitch's corners in `..corners.csv`",
-        patterns=_GPS_PATTERNS, needs_metadata=False, find_files=_find_gps, read_samples=_read_gps,
+        **TRACKING["gps"], patterns=_GPS_PATTERNS, needs_metadata=False, find_files=_find_gps, read_samples=_read_gps,
     ),
     TrackingProvider(
-        name="table", title="Plain CSV", files="one CSV with `time_s,player,x_m,y_m`, a row for each player and moment",
+        **TRACKING["table"],
         patterns=(rb"(?i)(?=[^\n]{0,400}\btime)(?=[^\n]{0,400}\b(player(_id)?|track_id|id)\b)(?=[^\n]{0,400}\bx(_m)?\b)"
                   rb"(?![^\n]{0,400}\b(lat|latitude|joint|landmark|type)\b)",),
         needs_metadata=False, has_pitch_size=False, find_files=_find_alone, read_samples=_read_table,

@@ -70,7 +70,7 @@ def test_a_fall_with_quadratic_drag_is_the_closed_form():
     assert at[:, 2] == pytest.approx(100.0 - fallen, abs=1e-6)
 
 
-def by_small_steps(launch, ball, seconds, step=1e-3):
+def by_small_steps(launch, ball, seconds, step=2e-3):
     """Position after `seconds` of a flight with bounces, by Runge-Kutta steps with the formulas written out anew."""
     x, v, w = (np.array(value, float) for value in (launch.position, launch.velocity, launch.spin))
 
@@ -108,6 +108,8 @@ def by_small_steps(launch, ball, seconds, step=1e-3):
         else:
             x, v, w = ahead
         left -= h
+        if left <= 0.0:
+            break
     return x
 
 

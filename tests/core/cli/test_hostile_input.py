@@ -13,11 +13,14 @@ import pytest
 
 from beyond_mocap.base import content, user_folders
 from beyond_mocap.cli.main import build_parser, main
+from beyond_mocap.cli.outputs import check_outputs
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.files.file_names import avoid_reserved_name
+from beyond_mocap.library import scan
 
 TOP = Path(__file__).resolve().parents[3]
-WALK = TOP / "sample_blend" / "library" / "walking_1_2.bvh"
+SAMPLE_LIBRARY = TOP / "sample_blend" / "library"
+WALK = SAMPLE_LIBRARY / "walking_1_2.bvh"
 POSIX = pytest.mark.skipif(os.name == "nt", reason="Windows has no such pipes, devices and signals")
 
 
@@ -163,6 +166,17 @@ def test_no_output_takes_the_place_of_a_librarys_recording_or_labels(command, na
     words = command.format(library=tmp_path, out=tmp_path / name, clip=WALK, track=track)
     status, line = run_line(*words.split())
     assert status == 2 and f"{name}: is a file of the library" in line and (tmp_path / name).read_bytes() == content
+
+
+def test_the_library_is_listed_once_for_all_outputs_that_exist(tmp_path, monkeypatch):
+    outputs = [tmp_path / name for name in ("a.bvh", "b.json", "c.csv")]
+    for path in outputs:
+        path.touch()
+    folders, find = [], scan.find_recordings
+    monkeypatch.setattr(scan, "find_recordings", lambda folder: folders.append(folder) or find(folder))
+    check_outputs(*outputs, None, library=SAMPLE_LIBRARY)
+    check_outputs(tmp_path / "new.bvh", library=SAMPLE_LIBRARY)
+    assert folders == [SAMPLE_LIBRARY]
 
 
 def test_no_output_takes_the_place_of_metadata_that_is_found_beside_tracking_data(run_line, tmp_path):

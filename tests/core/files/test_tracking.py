@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.cli.main import main
+from beyond_mocap.files.event_providers import EVENT_PROVIDERS
+from beyond_mocap.files.provider_texts import EVENTS, TRACKING
 from beyond_mocap.files.tracking import feed, tracking
 from beyond_mocap.files.tracking.feed import TrackingProvider
 from beyond_mocap.files.tracking.providers import PROVIDERS
@@ -299,6 +301,12 @@ def test_every_provider_is_known_by_its_form(tmp_path, raw, meta, provider, play
     assert np.nanmax(np.abs(match.positions[..., 0])) < 60 and np.nanmax(np.abs(match.positions[..., 1])) < 40
     assert np.all(np.diff(match.times) > 0) and match.times[0] == 0.0
     assert np.nanmin(match.positions) < -1.0 < 1.0 < np.nanmax(match.positions)
+
+
+def test_texts_and_records_have_the_same_providers_in_the_same_order():
+    assert [*TRACKING] == [*PROVIDERS] and [*EVENTS] == [*EVENT_PROVIDERS]
+    for texts, record in zip((*TRACKING.values(), *EVENTS.values()), (*PROVIDERS.values(), *EVENT_PROVIDERS.values())):
+        assert (record.name, record.title, record.files) == (texts["name"], texts["title"], texts["files"])
 
 
 def test_a_provider_is_one_record(tmp_path, monkeypatch, capsys):

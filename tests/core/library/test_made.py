@@ -3,6 +3,7 @@ asked for, and told."""
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -102,8 +103,9 @@ def test_kept_beside_the_cache_and_read_back_the_same(library, more):
     assert all(np.array_equal(a.heel_toe_contacts, b.heel_toe_contacts) for a, b in zip(again.clips, more.clips))
 
 
-def test_made_files_that_were_tidied_away_are_written_again(library, more):
-    place = library.cache_location[0]
+def test_made_files_that_were_tidied_away_are_written_again(library, more, tmp_path):
+    """In a copy: other processes use the cache."""
+    place = shutil.copytree(library.cache_location[0], tmp_path / "cache")
     before = {file.name: file.read_bytes() for file in (place / "made-gait").glob("*.bvh")}
     next((place / "made-gait").glob("*.bvh")).unlink()
     assert len(build_library(library.folder, cache_dir=place).with_synthetic_clips.clips) == len(more.clips)

@@ -140,10 +140,9 @@ def test_the_same_scene_is_the_same_bits(strikes_library):
 
 
 def test_strikes_vary_and_never_at_the_price_of_a_much_worse_fit(strikes_library, monkeypatch):
-    """Distinct strikes of the first eight, and the mean cost of all, over two scenes and two seeds."""
+    """Distinct strikes of the first eight, and the mean cost of all, over two scenes."""
     def measure():
-        found = [plan_scene(strikes_library, scene_of(name, seed=seed)).strikes
-                 for name in ("three", "six") for seed in (0, 3)]
+        found = [plan_scene(strikes_library, scene_of(name)).strikes for name in ("three", "six")]
         distinct = [len({(one.order.clip, one.order.hit.first) for one in strikes[:8]}) for strikes in found]
         return np.mean(distinct), np.mean([one.cost for strikes in found for one in strikes[:-1]])
 

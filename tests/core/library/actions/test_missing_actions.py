@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import shutil
 import weakref
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +15,7 @@ from beyond_mocap.annotation import KeyMoment, Span, Timeline
 from beyond_mocap.base.errors import InputError, NotInLibraryError
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library import features, missing_actions, synthetic_clips
+from beyond_mocap.library.build import build_library
 from beyond_mocap.library.missing_actions import (
     ActionMoment,
     add_actions,
@@ -282,7 +284,10 @@ def test_a_clip_that_is_built_again_has_the_same_bits(library, monkeypatch):
     assert len(missing_actions._clips[library]) == len(missing_actions._extended[library]) == 1
 
 
-def test_a_file_of_another_version_beside_the_cache_is_replaced(library):
+def test_a_file_of_another_version_beside_the_cache_is_replaced(library, tmp_path):
+    """In a copy: other processes use the cache."""
+    place = shutil.copytree(library.cache_location[0], tmp_path / "cache")
+    library = build_library(library.folder, cache_dir=place)
     path, = find_missing_actions(library, [moment("tackle", "block")])
     file = library.cache_location[0] / Path(path).relative_to(CACHE_FOLDER)
     file.parent.mkdir(parents=True, exist_ok=True)

@@ -67,18 +67,27 @@ def show_dribble(take):
 
 
 def measure_touch_gaps(take):
-    """Gaps in m between foot and ball in the output frames that show a touch of the clip."""
+    """Gaps in m between foot and ball in the output frames that show a touch of the clip; those 10 frames or more from
+    a transition, then all."""
     gap = measure_contact_gap(take.motion.skeleton, *forward_kinematics(take.motion), ("dribble",), take.ball.positions)
     away = np.abs(take.clip_frame / STEP - np.round(take.clip_frame / STEP)) * STEP
-    return np.abs(gap[show_dribble(take) & (away < 0.5)])
+    touches = np.flatnonzero(show_dribble(take) & (away < 0.5))
+    is_clear = np.abs(touches[:, None] - take.seams).min(axis=1) >= 10
+    return np.abs(gap[touches[is_clear]]), np.abs(gap[touches])
+
+
+def check_touch_gaps(take):
+    clear, gaps = measure_touch_gaps(take)
+    assert len(clear) >= 4 and np.median(clear) < 0.04 and clear.max() < 0.08, clear
+    assert gaps.max() < 0.18, gaps
 
 
 def test_a_dribbled_ball_rides_along_at_the_foot_that_touches_it(take):
-    shown, gaps = show_dribble(take), measure_touch_gaps(take)
+    shown = show_dribble(take)
     known = np.isfinite(take.ball.positions).all(axis=1)
     assert shown.sum() > 4 * FPS and known[shown].all()
     assert (known & ~shown).sum() < 2 * STEP, "the ball went on where a foot of the clip alone would touch it"
-    assert len(gaps) >= 4 and np.median(gaps) < 0.04 and gaps.max() < 0.2, gaps
+    check_touch_gaps(take)
     assert not take.ball.measured.any()
     assert any("a recorded ball is shown for" in line for line in take.warnings)
 
@@ -98,7 +107,7 @@ def test_an_update_carries_the_ball_too(take, dribbles, track_of, timeline_of):
     shown = show_dribble(again)
     assert 2 * FPS < shown.sum() < show_dribble(take).sum()
     assert np.isfinite(again.ball.positions[shown]).all()
-    assert np.median(measure_touch_gaps(again)) < 0.05
+    assert measure_touch_gaps(again)[0].max() < 0.08
 
 
 def test_the_ball_rides_along_across_windows(take, dribbles):
@@ -108,8 +117,7 @@ def test_the_ball_rides_along_across_windows(take, dribbles):
     first, end = max(find_runs(shown), key=lambda run: run[1] - run[0])
     assert end - first > 4 * FPS and known[shown].all() and (known & ~shown).sum() < 2 * STEP
     assert np.linalg.norm(np.diff(whole.ball.positions[first:end], axis=0), axis=1).max() * FPS < 8.0
-    gaps = measure_touch_gaps(whole)
-    assert len(gaps) >= 4 and np.median(gaps) < 0.04 and gaps.max() < 0.2, gaps
+    check_touch_gaps(whole)
     assert not any("a recorded ball is shown for" in line for line in whole.warnings), "that is told of the whole"
 
 
