@@ -146,8 +146,8 @@ class BeamTransitions:
             frame: (K,) whole library frames where they begin.
             limit: what a candidate that begins no piece may cost, above the base.
         Returns:
-            Numbers of the candidates (k,); lower bounds (k, B) float32, above the base: what each transition costs without
-            repetition, rates and feet; and the same with the change of recording.
+            Numbers of the candidates (k,); lower bounds (k, B) float32, above the base: what each transition costs
+            without repetition, rates and feet; and the same with the change of recording.
         """
         costs = self.costs
         lower_bound = costs.cuts.compute_pose_cost(frame, self.left)

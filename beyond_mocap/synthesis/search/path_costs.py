@@ -180,7 +180,8 @@ class PathCosts:
 
         def cost_of(part: slice) -> np.ndarray:
             part_pairs, terms = pairs.select_pairs(part), (rate[part], None if place is None else place[part])
-            return _sum_terms(self._iter_motion_costs(first, end, part_pairs, terms)) + fixed_cost.take(part_pairs.frame)
+            cost = _sum_terms(self._iter_motion_costs(first, end, part_pairs, terms))
+            return cost + fixed_cost.take(part_pairs.frame)
 
         best, cost = find_cheapest(cost_of, pairs.speed, speed, self.weights.speed, considered=considered, count=count,
                                    most=most, square_weight=self.weights.slide)

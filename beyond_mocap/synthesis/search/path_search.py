@@ -337,14 +337,12 @@ class PathSearch:
             known: (L,) costs of other ways to fill the slot.
         """
         transitions = self.build_transitions(before, free, ends[free])
-        most = np.inf  # candidates of a requested action have a share of the beam whatever they cost
-        if not self._list_requested_actions(slot):
-            most = transitions.bound_own_cost(known, self.width.beam_width)
+        # candidates of a requested action have a share of the beam whatever they cost
+        is_asked = bool(self._list_requested_actions(slot))
+        most = np.inf if is_asked else transitions.bound_own_cost(known, self.width.beam_width)
         to = self.collect_candidates(slot, most)
         which, cost, state = transitions.find_cheapest(to, known, self.width.beam_width)
-        acts = self._list_requested_actions(slot)
-        acting = np.flatnonzero(self._shows_requested_action(slot, to.start) & (to.piece < 0)) if acts else ()
-        if len(acting):
+        if is_asked and len(acting := np.flatnonzero(self._shows_requested_action(slot, to.start) & (to.piece < 0))):
             more, *rest = transitions.find_cheapest(to.select(acting), np.zeros(0), self._acting_width)
             new = ~np.isin(acting[more], which)
             which, cost, state = (np.concatenate(pair) for pair in zip(
