@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -16,6 +17,15 @@ from . import quaternion
 from .skeleton import Skeleton, freeze_array
 
 _PLUS, _MINUS = np.add, np.subtract
+_FEW_FRAMES, _SOME_JOINTS = 100, 8
+"""Frames up to which, and joints from which on a pose is computed by depth: there the calls take longer than what they
+compute."""
+_PRODUCT_ORDER = [[1, 0, 3, 2], [2, 3, 0, 1], [3, 2, 1, 0]]
+_PRODUCT_SIGNS = np.array([[-1.0, 1.0, -1.0, 1.0], [-1.0, 1.0, 1.0, -1.0], [-1.0, -1.0, 1.0, 1.0]])[..., None]
+"""Of the right quaternion's components, those that the left one's x, y and z are multiplied with, and their signs."""
+_NEXT, _LAST = [1, 2, 0], [2, 0, 1]
+_AHEAD, _BEHIND = [2, 3, 1], [3, 1, 2]
+"""The cyclic orders of a vector's axes in a cross product, and the same of a quaternion's."""
 _SLERP_FRAMES = 128
 _CUBIC_REACH = 8
 """Frames to either side on which a value between two frames depends; a spline's memory fades by 0.27 a frame."""
@@ -105,9 +115,6 @@ def compute_pose(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compute world positions and rotations of poses.
 
-    Works joint by joint on component-first arrays, one contiguous run per component, and without new arrays: what it
-    works on stays in the processor's cache.
-
     Args:
         skeleton: J joints.
         root: (..., 3) root positions, metres, world.
@@ -122,8 +129,28 @@ def compute_pose(
     if joints is not None:
         world[:], places[:] = np.nan, np.nan
     world[0], places[0] = flat[0], root.reshape(-1, 3).T
+    chosen = tuple(range(1, len(skeleton)) if joints is None else sorted({*joints} - {0}))
+    is_short = flat.shape[2] <= _FEW_FRAMES and len(chosen) >= _SOME_JOINTS
+    pose = _pose_by_depth if is_short else _pose_by_joint
+    pose(skeleton, flat, world, places, joints=chosen)
+    return (
+        places.transpose(2, 0, 1).reshape(*lead, len(skeleton), 3),
+        world.transpose(2, 0, 1).reshape(*lead, len(skeleton), 4),
+    )
+
+
+def _pose_by_joint(skeleton: Skeleton, flat: np.ndarray, world: np.ndarray, places: np.ndarray, *,
+                   joints: Sequence[int]) -> None:
+    """Fill in rotations (J, 4, T) and positions (J, 3, T) m joint by joint: what it works on stays in the cache.
+
+    Args:
+        skeleton: J joints.
+        flat: (J, 4, T) local rotations.
+        world, places: those of the root are there, those of `joints` are written.
+        joints: ascending, without the root.
+    """
     spare, turned = np.empty(flat.shape[2]), np.empty((3, flat.shape[2]))
-    for joint in range(1, len(skeleton)) if joints is None else sorted({*joints} - {0}):
+    for joint in joints:
         parent, offset = skeleton.parents[joint], skeleton.offsets[joint]
         aw, ax, ay, az = world[parent]
         bw, bx, by, bz = flat[joint]
@@ -145,10 +172,40 @@ def compute_pose(
         _add_products(places[joint, 1], spare, (_PLUS, aw, ty), (_PLUS, az, tx), (_MINUS, ax, tz))
         _add_products(places[joint, 2], spare, (_PLUS, aw, tz), (_PLUS, ax, ty), (_MINUS, ay, tx))
         np.add(places[joint], places[parent], places[joint])  # += would also copy the sum onto itself
-    return (
-        places.transpose(2, 0, 1).reshape(*lead, len(skeleton), 3),
-        world.transpose(2, 0, 1).reshape(*lead, len(skeleton), 4),
-    )
+
+
+def _pose_by_depth(skeleton: Skeleton, flat: np.ndarray, world: np.ndarray, places: np.ndarray, *,
+                   joints: tuple[int, ...]) -> None:
+    """Do the same, to the bit, for all joints of one depth at once: of few frames, the calls are what takes time."""
+    levels = _group_by_depth(skeleton.parents, joints)
+    signed = flat[:, _PRODUCT_ORDER] * _PRODUCT_SIGNS
+    for level, above in levels:
+        parent = world[above][:, :, None]
+        product = parent[:, 0] * flat[level]
+        for axis in range(3):
+            product += parent[:, 1 + axis] * signed[level, axis]
+        world[level] = product
+    rows = list(joints)
+    parent, offset = world[[skeleton.parents[joint] for joint in rows]], skeleton.offsets[rows][:, :, None]
+    ahead, behind = parent[:, _AHEAD], parent[:, _BEHIND]
+    turned = (ahead * offset[:, _LAST] - behind * offset[:, _NEXT]) * 2
+    moved = parent[:, :1] * turned
+    moved += offset
+    moved += ahead * turned[:, _LAST]
+    moved -= behind * turned[:, _NEXT]
+    places[rows] = moved
+    for level, above in levels:
+        places[level] += places[above]
+
+
+@lru_cache(maxsize=256)
+def _group_by_depth(parents: tuple[int, ...], joints: tuple[int, ...]) -> list[tuple[list[int], list[int]]]:
+    """Group joints by their depth below the root: (joints, their parents) of each, from the top down."""
+    depth, groups = {0: 0}, {}
+    for joint in joints:
+        depth[joint] = depth[parents[joint]] + 1
+        groups.setdefault(depth[joint], []).append(joint)
+    return [(level, [parents[joint] for joint in level]) for _, level in sorted(groups.items())]
 
 
 def _add_products(out: np.ndarray, spare: np.ndarray, *terms: tuple) -> None:

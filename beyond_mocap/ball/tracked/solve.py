@@ -208,15 +208,17 @@ def _build_pieces(samples: Samples, window: slice, cuts: touches.Cuts) -> list[B
     times = samples.times[window]
     edges = np.concatenate([[times[0]], cuts.time, [times[-1]]])
     edges = np.maximum.accumulate(edges)
+    long_enough = np.flatnonzero(np.diff(edges) >= 1e-6)
+    if not len(long_enough):
+        return []
+    knots = [_place_knots(edges[index], edges[index + 1]) for index in long_enough]
+    which, every = np.repeat(long_enough, [len(at) for at in knots]), np.concatenate(knots)
+    bounds = np.cumsum([len(at) for at in knots])[:-1]
+    curves = (np.split(values, bounds) for values in (cuts.pieces.position(every, which),
+                                                      cuts.pieces.velocity(every, which)))
     out = []
-    for index in range(len(cuts.pieces)):
+    for index, at, places, speeds in zip(long_enough.tolist(), knots, *curves):
         start, end = edges[index], edges[index + 1]
-        if end - start < 1e-6:
-            continue
-        count = max(2, int(np.ceil((end - start) / _STEP)) + 1)
-        at = np.linspace(start, end, count)
-        which = np.full(count, index)
-        places, speeds = cuts.pieces.position(at, which), cuts.pieces.velocity(at, which)
         # At the start (cut index - 1) and at the end (cut index) add a shift that falls quadratically to zero.
         for edge, place, slope_sign in ((index - 1, 0, -2.0), (index, -1, 2.0)):
             if 0 <= edge < len(cuts.time):
@@ -225,6 +227,11 @@ def _build_pieces(samples: Samples, window: slice, cuts: touches.Cuts) -> list[B
                 places, speeds = places + near**2 * miss, speeds + slope_sign / over * near * miss
         out.append(_build_piece(samples, at, *_add_heights(places, speeds)))
     return out
+
+
+def _place_knots(start: float, end: float) -> np.ndarray:
+    """Place the knots (n,) s of a piece, at most _STEP apart."""
+    return np.linspace(start, end, max(2, int(np.ceil((end - start) / _STEP)) + 1))
 
 
 def _add_heights(places: np.ndarray, speeds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -267,10 +274,11 @@ def _label_touches(samples, found, positions, players, teams, pitch, untracked_c
     time, spread, margin, place = time[kept], spread[kept], margin[kept], place[kept]
     before, after, away, chosen = before[kept], after[kept], away[:, kept], chosen[kept]
     goals = find_goal_lines(positions, teams, pitch[0])
+    known = [np.flatnonzero(np.isfinite(path[:, 0])) for path in positions]
     out = []
     for k in range(len(time)):
         player = int(chosen[k])
-        moving = _estimate_player_velocity(samples, positions, player, time[k])
+        moving = _estimate_player_velocity(samples, positions, known, player, time=time[k])
         part = kinds.choose_part(place[k, 2] if known_height else None)
         same_next = k + 1 < len(time) and chosen[k + 1] == player and time[k + 1] - time[k] < 3.0
         same_before = k > 0 and chosen[k - 1] == player and time[k] - time[k - 1] < 3.0
@@ -365,15 +373,21 @@ def _measure_mean_distance(samples: Samples, positions: np.ndarray, time: np.nda
     return (total[:, at] - total[:, before]) / np.maximum(count[:, at] - count[:, before], 1)
 
 
-def _estimate_player_velocity(samples: Samples, positions: np.ndarray, player: int, time: float) -> np.ndarray:
-    """Estimate a player's velocity (3,) m/s around `time`; zero if the player is not known then."""
+def _estimate_player_velocity(samples: Samples, positions: np.ndarray, known: Sequence[np.ndarray], player: int,
+                              time: float) -> np.ndarray:
+    """Estimate a player's velocity (3,) m/s around `time`; zero if the player is not known then.
+
+    known: for each player, the samples in which they are.
+    """
     if player < 0:
         return np.zeros(3)
     ends = np.array([time - 0.2, time + 0.2])
-    path, there = positions[player], np.isfinite(positions[player, :, 0])
-    if np.count_nonzero(there) < 2:
+    path, there = positions[player], known[player]
+    if len(there) < 2:
         return np.zeros(3)
-    place = [np.interp(ends, samples.times[there], path[there, axis]) for axis in range(2)]
+    first, last = np.searchsorted(there, np.searchsorted(samples.times, ends))
+    near = there[max(first - 2, 0) : last + 2]  # with a sample beyond either end
+    place = [np.interp(ends, samples.times[near], path[near, axis]) for axis in range(2)]
     return np.array([*((p[1] - p[0]) / 0.4 for p in place), 0.0])
 
 

@@ -67,9 +67,11 @@ class SolvedTrajectory:
         return tuple(np.concatenate([getattr(piece, name) for piece in self.pieces]) for name in names)
 
     @cached_property
-    def _piece_starts(self) -> np.ndarray:
-        """Indices of the knots at which pieces start."""
-        return np.cumsum([0, *(len(piece.times) for piece in self.pieces[:-1])])
+    def _is_start(self) -> np.ndarray:
+        """Whether each knot is the first of its piece."""
+        found = np.zeros(len(self._knots[0]), bool)
+        found[np.cumsum([0, *(len(piece.times) for piece in self.pieces[:-1])])] = True
+        return found
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """Give the positions (N, 3) m of the ball's centre at `times` (N,) s."""
@@ -88,7 +90,7 @@ class SolvedTrajectory:
         safe = np.maximum(step, 1e-9)
         share = np.clip((at - times[before])[:, None] / safe, 0.0, 1.0)
         p, q = places[before], places[after]
-        in_gap = np.isin(after, self._piece_starts)[:, None]
+        in_gap = self._is_start[after][:, None]
         m, n = (np.where(in_gap, q - p, speeds[knot] * step) for knot in (before, after))
         if not slope:
             return hermite(share, p, m, q, n)

@@ -99,10 +99,12 @@ def _align_lines(motions, first_frames, lines) -> tuple[list[np.ndarray], int]:
     start = min(first_frames, default=0)
     count = max((first + len(motion) for first, motion in zip(first_frames, motions)), default=start) - start
     aligned = []
-    for motion, first, own in zip(motions, first_frames, lines or map(compute_capsule_lines, motions)):
-        ends = np.full((count, *own.shape[1:]), np.nan)
-        ends[first - start : first - start + len(motion)] = own
-        aligned.append(ends)
+    for first, own in zip(first_frames, lines or map(compute_capsule_lines, motions)):
+        if len(own) < count:
+            ends = np.full((count, *own.shape[1:]), np.nan)
+            ends[first - start : first - start + len(own)] = own
+            own = ends
+        aligned.append(own)
     return aligned, start
 
 

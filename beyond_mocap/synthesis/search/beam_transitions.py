@@ -49,6 +49,7 @@ class BeamTransitions:
         costs: the search's `PathCosts`.
         clip: (B,) clip that each state shows.
         end: (B,) library frame at which it ends.
+        left: (B,) the same, whole.
         rate: (B,) playback rate.
         recent: (B, M) buckets of frames that it has shown lately, -1 for none.
         young: (B,) what each state's last cut adds to the next one.
@@ -60,6 +61,7 @@ class BeamTransitions:
                  young: np.ndarray):
         self.costs, self.clip, self.end, self.recent = costs, clip, end, recent
         self.rate = rate.astype(np.float32)
+        self.left = costs.index.round_frame(end)
         self.young = young.astype(np.float32)
         self.base = float(cost.min())
         self.above = (cost - self.base).astype(np.float32)
@@ -76,8 +78,9 @@ class BeamTransitions:
 
     def compute_all(self, to: SlotCandidates) -> np.ndarray:
         """Compute the cost (B, K) of each transition, including what the candidate shows."""
-        least, _ = self._compute_lower_bounds(to)
-        _, cost = self._compute_full_costs(to, least, np.arange(least.size))
+        frame = self.costs.index.round_frame(to.start)
+        _, least, _ = self._compute_lower_bounds(to, frame, np.float32(np.inf))
+        _, cost = self._compute_full_costs(to, frame, least, np.arange(least.size))
         return self.base + cost.reshape(least.shape).T.astype(float)
 
     def bound_own_cost(self, known: np.ndarray, kept_count: int) -> float:
@@ -111,12 +114,14 @@ class BeamTransitions:
         near = np.flatnonzero((to.piece >= 0) | (to.cost <= limit))
         if not len(near):
             return near, np.zeros(0), near
-        to = to.select(near)
-        least, changed = self._compute_lower_bounds(to)
-        count = least.shape[1]
+        to, frame = to.select(near), self.costs.index.round_frame(to.start[near])
+        rows, least, changed = self._compute_lower_bounds(to, frame, np.float32(limit))
+        if not len(rows):
+            return rows, np.zeros(0), rows
+        near, to, frame, count = near[rows], to.select(rows), frame[rows], least.shape[1]
         # bound[k]: full cost of the pair with the lowest lower bound, so an upper bound of the candidate's cost
         first = np.arange(len(least)) * count + np.argmin(changed, axis=1)
-        _, bound = self._compute_full_costs(to, least, first)
+        _, bound = self._compute_full_costs(to, frame, least, first)
         free = to.piece < 0
         # no free candidate above the `kept_count`-th best of all upper bounds can be kept
         rivals = np.concatenate([bound[free], known - self.base])
@@ -124,7 +129,7 @@ class BeamTransitions:
             bound[free] = np.minimum(bound[free], np.partition(rivals, kept_count - 1)[kept_count - 1])
         # only pairs whose lower bound is within the upper bound are evaluated in full; flat index = candidate * B +
         # state
-        pairs, cost = self._compute_full_costs(to, least, np.flatnonzero(changed <= bound[:, None]), bound)
+        pairs, cost = self._compute_full_costs(to, frame, least, np.flatnonzero(changed <= bound[:, None]), most=bound)
         candidate = pairs // count
         # `pairs` is sorted by candidate, so each candidate is one run
         begins = np.flatnonzero(np.diff(candidate, prepend=-1))
@@ -132,31 +137,47 @@ class BeamTransitions:
         at = at[cost[at] <= bound[candidate[at]]]
         return near[candidate[at]], self.base + cost[at].astype(float), pairs[at] % count
 
-    def _compute_lower_bounds(self, to: SlotCandidates) -> tuple[np.ndarray, np.ndarray]:
-        """Compute lower bounds (K, B) float32, above the base, of all transitions: what each costs without repetition,
-        rates and feet, and the same with the change of recording.
+    def _compute_lower_bounds(self, to: SlotCandidates, frame: np.ndarray, limit: np.float32
+                              ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Compute lower bounds of the transitions to the candidates that may be kept.
+
+        Args:
+            to: K candidates.
+            frame: (K,) whole library frames where they begin.
+            limit: what a candidate that begins no piece may cost, above the base.
+        Returns:
+            Numbers of the candidates (k,); lower bounds (k, B) float32, above the base: what each transition costs
+            without repetition, rates and feet; and the same with the change of recording.
         """
         costs = self.costs
-        end, start = costs.index.round_frame(self.end), costs.index.round_frame(to.start)
-        lower_bound = costs.cuts.compute_pose_cost(start, end)
-        leave, enter = costs.cuts.compute_cut_ends(end, start)
+        lower_bound = costs.cuts.compute_pose_cost(frame, self.left)
+        leave, enter = costs.cuts.compute_cut_ends(self.left, frame)
         cost = to.cost.astype(np.float32)
         lower_bound += (enter + cost)[:, None]
         lower_bound += leave + self.young + self.above
         # without a cut nothing but the costs of state and candidate remains
         candidate, state = self._find_uncut_pairs(to)
         lower_bound[candidate, state] = self.above[state] + cost[candidate]
-        changed = lower_bound + costs.cuts.compute_recording_change(end, start[:, None])
-        changed[candidate, state] = lower_bound[candidate, state]
-        return lower_bound, changed
+        cheapest = lower_bound.ravel().take(np.arange(len(frame)) * len(leave) + np.argmin(lower_bound, axis=1))
+        rows = np.flatnonzero((cheapest <= limit) | (to.piece >= 0))
+        if len(rows) < len(frame):  # others cannot be kept: the known ways to fill the slot cost less
+            lower_bound = lower_bound.take(rows, axis=0)
+        changed = lower_bound + costs.cuts.compute_recording_change(self.left, frame.take(rows)[:, None])
+        at = np.searchsorted(rows, candidate)
+        is_left = np.append(rows, -1)[at] == candidate
+        at, state = at[is_left], state[is_left]
+        changed[at, state] = lower_bound[at, state]
+        return rows, lower_bound, changed
 
     def _compute_full_costs(
-        self, to: SlotCandidates, lower_bound: np.ndarray, pairs: np.ndarray, most: np.ndarray | None = None
+        self, to: SlotCandidates, frame: np.ndarray, lower_bound: np.ndarray, pairs: np.ndarray,
+        most: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Compute the full costs of some pairs.
 
         Args:
             to: K candidates.
+            frame: (K,) whole library frames where they begin.
             lower_bound: (K, B) lower bounds.
             pairs: (P,) flat indices into `lower_bound`.
             most: (K,) of each candidate's pairs, those that cost more are left out; None for no limit.
@@ -166,27 +187,24 @@ class BeamTransitions:
         candidate, state = np.divmod(pairs, lower_bound.shape[1])
         least, rate = lower_bound.ravel().take(pairs), self._compute_rate_changes(to, candidate, state)
         goes_on = self._goes_on(to, candidate, state)
-        change, replay = self._compute_repetition(to, candidate, state)
+        change, replay = self._compute_repetition(frame.take(candidate), state)
         if most is not None:  # rounded sums do not fall where a term is added, so feet cannot make a pair cheaper
             within = np.flatnonzero(least + np.where(goes_on, np.float32(0.0), change + replay) + rate
                                     <= most.take(candidate))
             pairs, candidate, state, least, rate, goes_on, change, replay = (
                 values.take(within) for values in (pairs, candidate, state, least, rate, goes_on, change, replay))
-        frame, left = self._round_frames(to, candidate, state)
-        cut = np.float32(self.costs.weights.feet) * self.costs.cuts.measure_foot_jump(left, frame)
+        jump = self.costs.cuts.measure_foot_jump(self.left.take(state), frame.take(candidate))
+        cut = np.float32(self.costs.weights.feet) * jump
         cut += change
         cut += replay
         cut[goes_on] = 0.0
         return pairs, least + cut + rate
 
-    def _round_frames(self, to: SlotCandidates, candidate: np.ndarray, state: np.ndarray):
-        """Round the library frames (P,) that pairs enter and leave."""
-        round_frame = self.costs.index.round_frame
-        return round_frame(to.start).take(candidate), round_frame(self.end).take(state)
-
-    def _compute_repetition(self, to: SlotCandidates, candidate: np.ndarray, state: np.ndarray):
-        """Compute what pairs (P,) cost for another recording, and (P,) for what has been shown lately."""
-        costs, (frame, left) = self.costs, self._round_frames(to, candidate, state)
+    def _compute_repetition(self, frame: np.ndarray, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Compute what cuts from states to library frames (P,) cost for another recording, and (P,) for what has been
+        shown lately.
+        """
+        costs, left = self.costs, self.left.take(state)
         bucket = costs.index.bucket.take(frame)
         shown = self.seen_buckets.ravel().take(state * self.seen_buckets.shape[1] + bucket)
         # a stand may be shown again: nothing in it is recognized

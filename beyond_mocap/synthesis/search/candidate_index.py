@@ -54,7 +54,7 @@ class RatePairs:
         offset: (K,) rad from the direction of travel to the facing.
         long_stance: (K,) s of contact of both feet beyond that of a walk.
         lifted: (K,) share of the slot without both feet on the ground.
-        lean: (K, 2) slopes ahead and to the left of the travel, over the slot.
+        lean: (K, 2) slopes ahead and to the left of the travel, over the slot; by column in memory, as they are read.
     """
 
     number: np.ndarray
@@ -120,7 +120,7 @@ class CandidateIndex:
                 cache.save_arrays(*place, self._list_arrays())
         else:
             vars(self).update({name: known[name] for name in _STORED})
-            self._sorted[frozenset()] = RatePairs(*(known[name] for name in _list_pair_names()))
+            self._sorted[frozenset()] = RatePairs(*(np.asfortranarray(known[name]) for name in _list_pair_names()))
 
     def _list_arrays(self) -> dict[str, np.ndarray]:
         """List the arrays that are stored, with all pairs in order of their speeds."""
@@ -184,9 +184,10 @@ class CandidateIndex:
 
     def build_pairs(self, number: np.ndarray, frame: np.ndarray) -> RatePairs:
         """Build the pairs of PLAYBACK_RATES[number (K,)] and library frame (K,)."""
-        played = self.speed[number, frame], self.turn[number, frame]
-        return RatePairs(number, frame, *played, self.offset[frame], self.long_stance[frame], self.lifted[frame],
-                         self.lean[frame])
+        pair = number.astype(np.intp) * len(self.frames) + frame
+        played = self.speed.ravel().take(pair), self.turn.ravel().take(pair)
+        return RatePairs(number, frame, *played, self.offset.take(frame), self.long_stance.take(frame),
+                         self.lifted.take(frame), np.asfortranarray(self.lean.take(frame, axis=0)))
 
     def pairs_by_speed(self, avoid: frozenset[str] = frozenset()) -> RatePairs:
         """Return all valid pairs in order of their speeds, without those that show a label of `avoid` unless all do."""

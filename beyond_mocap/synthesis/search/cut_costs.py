@@ -59,7 +59,7 @@ class CutCosts:
     def compute_recording_change(self, ends: np.ndarray, start: np.ndarray) -> np.ndarray:
         """Compute the cost of cuts between library frames, broadcast together, for changing the recording."""
         recording = self.index.recording
-        return np.float32(self.weights.other) * (recording[ends] != recording[start])
+        return np.float32(self.weights.other) * (recording.take(ends) != recording.take(start))
 
     def compute_young_cut_cost(self, age: np.ndarray) -> np.ndarray:
         """Compute what a cut costs (B,) for coming soon after the last one, age (B,) slots ago."""
@@ -111,21 +111,22 @@ class CutCosts:
 
 def compute_distances(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Compute the distances (B, K) between points (B, D) and (K, D)."""
-    square = _append_square(a, -2.0 * a, 1) @ _append_square(b, b, 0).T
+    square = _append_square(a, -2.0, 1) @ _append_square(b, 1.0, 0).T
     return np.sqrt(np.maximum(square, 0.0, out=square), out=square)
 
 
-def _append_square(points: np.ndarray, scaled: np.ndarray, place: int) -> np.ndarray:
+def _append_square(points: np.ndarray, scale: float, place: int) -> np.ndarray:
     """Append squared lengths and ones to scaled points, so that one product is |a|^2 + |b|^2 - 2 a b.
 
     Args:
         points: (K, D).
-        scaled: (K, D).
+        scale: of the points, a power of two.
         place: which of the two last columns holds the squares.
     Returns:
         (K, D + 2).
     """
-    out = np.ones((len(points), points.shape[1] + 2), points.dtype)
-    out[:, :-2] = scaled
+    out = np.empty((len(points), points.shape[1] + 2), points.dtype)
+    np.multiply(points, scale, out=out[:, :-2])
     np.einsum("kd,kd->k", points, points, out=out[:, -2 + place])
+    out[:, -1 - place] = 1.0
     return out

@@ -62,8 +62,8 @@ def find_cheapest(
     cost = cost_of(near)
     within = np.flatnonzero(cost <= most)
     if len(within) > count:
-        within = np.sort(within[np.argpartition(cost[within], count)[:count]])
-    return near.start + within, cost[within]
+        within = np.sort(within.take(np.argpartition(cost.take(within), count)[:count]))
+    return near.start + within, cost.take(within)
 
 
 def _nearest_slice(speeds: np.ndarray, speed: float, count: int) -> slice:
@@ -112,6 +112,7 @@ class PathCosts:
                                    request.size) if bodies else None
         self._rate_cost = (weights.rate * np.abs(PLAYBACK_RATES - 1.0)).astype(np.float32)
         self._cached_costs: dict[tuple[frozenset[str], bool, frozenset[str]], np.ndarray] = {}
+        self._cached_terms: dict[frozenset[str], tuple[np.ndarray, np.ndarray | None]] = {}
         # a strike turns as it was recorded: the body follows it there (`construct.construction`)
         self._key_weights = replace(weights, turn=KEY_TURN * weights.turn, facing=KEY_TURN * weights.facing,
                                     slide=KEY_SLIDE * weights.slide)
@@ -142,13 +143,16 @@ class PathCosts:
         Returns:
             (K,); inf where the clip ends before or may not be used.
         """
-        cost = _sum_terms(self._iter_motion_costs(first, end, self.index.build_pairs(number, frame)))
-        cost += self._fixed_costs(*self._requested_labels(first, end), self.request.list_avoided(first, end))[frame]
+        terms = self._list_pair_terms(number, frame)
+        cost = _sum_terms(self._iter_motion_costs(first, end, self.index.build_pairs(number, frame), terms))
+        fixed = self._fixed_costs(*self._requested_labels(first, end), self.request.list_avoided(first, end))
+        cost += fixed.take(frame)
         return np.where(self.index.valid[number, frame], cost, np.inf)
 
     def iter_misfit_terms(self, first: int, end: int, number: np.ndarray, frame: np.ndarray) -> Iterator[Term]:
         """Generate the terms of `compute_misfit`, by name, each (K,)."""
-        yield from self._iter_motion_costs(first, end, self.index.build_pairs(number, frame))
+        yield from self._iter_motion_costs(first, end, self.index.build_pairs(number, frame),
+                                           self._list_pair_terms(number, frame))
         yield from self._iter_fixed_terms(frame, *self._requested_labels(first, end),
                                           self.request.list_avoided(first, end))
 
@@ -170,10 +174,14 @@ class PathCosts:
         (words, is_asked), avoid = self._requested_labels(first, end), self.request.list_avoided(first, end)
         pairs, fixed_cost, (speed, _) = self.index.pairs_by_speed(avoid), self._fixed_costs(words,
                 is_asked, avoid), self.requested_motion(first, end)
+        if avoid not in self._cached_terms:
+            self._cached_terms[avoid] = self._list_pair_terms(pairs.number, pairs.frame)
+        rate, place = self._cached_terms[avoid]
 
         def cost_of(part: slice) -> np.ndarray:
-            part_pairs = pairs.select_pairs(part)
-            return _sum_terms(self._iter_motion_costs(first, end, part_pairs)) + fixed_cost.take(part_pairs.frame)
+            part_pairs, terms = pairs.select_pairs(part), (rate[part], None if place is None else place[part])
+            cost = _sum_terms(self._iter_motion_costs(first, end, part_pairs, terms))
+            return cost + fixed_cost.take(part_pairs.frame)
 
         best, cost = find_cheapest(cost_of, pairs.speed, speed, self.weights.speed, considered=considered, count=count,
                                    most=most, square_weight=self.weights.slide)
@@ -189,7 +197,15 @@ class PathCosts:
         middle = (first + end) // 2
         return self.request.requested_labels[middle] or frozenset(), bool(self.request.is_asked[middle])
 
-    def _iter_motion_costs(self, first: int, end: int, pairs: RatePairs) -> Iterator[Term]:
+    def _list_pair_terms(self, number: np.ndarray, frame: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+        """List what pairs cost for their playback rate (K,), and their places (K,) in the period of the player's lag,
+        None without one: they are the same in every slot.
+        """
+        lag = self.request.lag_preference
+        return self._rate_cost.take(number), None if lag is None else lag.place.take(frame)
+
+    def _iter_motion_costs(self, first: int, end: int, pairs: RatePairs,
+                           pair_terms: tuple[np.ndarray, np.ndarray | None]) -> Iterator[Term]:
         """Generate the terms that depend on the track: motion of pairs (K,), playback rate, and the player's lag."""
         # pairs hold the turn over SLOT frames, this slot may be longer or shorter
         turn = pairs.turn * np.float32((end - first) / SLOT)
@@ -202,9 +218,10 @@ class PathCosts:
         if self.known is not None and self.known.counts[first]:
             away = self.known.measure_distance(first, self.frames.features[pairs.frame])
             yield "known", np.float32(self.weights.known) * away.astype(np.float32)
-        yield "rate", self._rate_cost.take(pairs.number)
-        if self.request.lag_preference is not None:
-            yield "variety", self.request.lag_preference.compute_cost(first, pairs.frame)
+        rate, place = pair_terms
+        yield "rate", rate
+        if place is not None:
+            yield "variety", self.request.lag_preference.compute_cost(first, place)
 
     def _find_wanted_lean(self, first: int, end: int) -> np.ndarray:
         """Find the mean lean (2,) of the track from frame first to end; cached."""

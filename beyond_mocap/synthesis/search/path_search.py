@@ -112,6 +112,7 @@ class PathSearch:
         self._report = progress or (lambda fraction, text: None)
         self._cancelled = cancelled or (lambda: False)
         self._hurry, self._narrow = hurry or (lambda: False), narrow
+        self._requested_actions: dict[int, frozenset[str]] = {}
 
     def run(self) -> EditList:
         """Find the sequence with the lowest cost that the beam reaches.
@@ -241,9 +242,11 @@ class PathSearch:
         backward, one that does nothing costs less for a moment, in more ways than a beam holds.
         """
         width, order = self.width.beam_width, np.argsort(cost, kind="stable")
-        free, acts = piece[order] < 0, self._shows_requested_action(slot, start[order])
+        free = piece[order] < 0
         kept = (order[free][:width], order[~free][:width])
-        acting = order[free & acts][: self._acting_width]
+        if not self._list_requested_actions(slot):
+            return np.concatenate(kept)
+        acting = order[free & self._shows_requested_action(slot, start[order])][: self._acting_width]
         acting = np.setdiff1d(acting, kept[0]) if len(acting) else acting
         return np.concatenate([*kept, acting])
 
@@ -264,8 +267,10 @@ class PathSearch:
         return self.index.shows_labels(words)[self.index.round_frame(start)]
 
     def _list_requested_actions(self, slot: int) -> frozenset[str]:
-        """List the labels of actions that the user asks for in a slot."""
-        return ACTING & self.costs.list_asked_labels(*self.edges[slot : slot + 2])
+        """List the labels of actions that the user asks for in a slot; cached."""
+        if slot not in self._requested_actions:
+            self._requested_actions[slot] = ACTING & self.costs.list_asked_labels(*self.edges[slot : slot + 2])
+        return self._requested_actions[slot]
 
     def collect_candidates(self, slot: int, most: float = np.inf) -> SlotCandidates:
         """Collect the candidates that can begin in a slot.
@@ -320,8 +325,9 @@ class PathSearch:
     def _compute_misfit_inside(self, slot: int, clip: np.ndarray, start: np.ndarray, number: np.ndarray) -> np.ndarray:
         """Compute the misfit (K,) of playing clips from fractional frames on, inf where they do not last."""
         low, high = self.edges[slot : slot + 2]
-        first, last = self.frames.first[clip], self.frames.first[clip] + self.frames.count[clip] - 1
-        lasts = (start >= first) & (start + PLAYBACK_RATES[number] * (high - low) <= last)
+        first = self.frames.first.take(clip)
+        last = first + self.frames.count.take(clip) - 1
+        lasts = (start >= first) & (start + PLAYBACK_RATES.take(number) * (high - low) <= last)
         return np.where(lasts, self.costs.compute_misfit(low, high, number, self.index.round_frame(start)), np.inf)
 
     def _find_transitions(self, slot: int, before: BeamStates, ends: np.ndarray, free: np.ndarray, known: np.ndarray):
@@ -331,13 +337,12 @@ class PathSearch:
             known: (L,) costs of other ways to fill the slot.
         """
         transitions = self.build_transitions(before, free, ends[free])
-        most = np.inf  # candidates of a requested action have a share of the beam whatever they cost
-        if not self._list_requested_actions(slot):
-            most = transitions.bound_own_cost(known, self.width.beam_width)
+        # candidates of a requested action have a share of the beam whatever they cost
+        is_asked = bool(self._list_requested_actions(slot))
+        most = np.inf if is_asked else transitions.bound_own_cost(known, self.width.beam_width)
         to = self.collect_candidates(slot, most)
         which, cost, state = transitions.find_cheapest(to, known, self.width.beam_width)
-        acting = np.flatnonzero(self._shows_requested_action(slot, to.start) & (to.piece < 0))
-        if len(acting):
+        if is_asked and len(acting := np.flatnonzero(self._shows_requested_action(slot, to.start) & (to.piece < 0))):
             more, *rest = transitions.find_cheapest(to.select(acting), np.zeros(0), self._acting_width)
             new = ~np.isin(acting[more], which)
             which, cost, state = (np.concatenate(pair) for pair in zip(
@@ -360,10 +365,10 @@ class PathSearch:
     def _continue_clips(self, slot: int, before: BeamStates, ends: np.ndarray, free: np.ndarray):
         """Continue without a cut, at each playback rate, where the slot still ends inside the clip."""
         back = np.repeat(free, len(PLAYBACK_RATES))
-        number = np.tile(np.arange(len(PLAYBACK_RATES)), len(free))
-        clip, start, rate = before.clip[back], ends[back], PLAYBACK_RATES[number]
-        cost = before.cost[back] + self._compute_misfit_inside(slot, clip, start, number)
-        cost += self.weights.rate_change * np.abs(rate - before.rate[back])
+        number = np.arange(len(back)) % len(PLAYBACK_RATES)
+        clip, start, rate = before.clip.take(back), ends.take(back), PLAYBACK_RATES.take(number)
+        cost = before.cost.take(back) + self._compute_misfit_inside(slot, clip, start, number)
+        cost += self.weights.rate_change * np.abs(rate - before.rate.take(back))
         return clip, start, rate, cost, back, np.full(len(back), -1)
 
     def _trace_path(self, layers: list[BeamStates]) -> EditList:

@@ -159,11 +159,13 @@ class LagPreference:
     table: np.ndarray
     start: int
 
-    def compute_cost(self, first: int, frame: np.ndarray) -> np.ndarray:
-        """Compute the cost (K,) of showing library frames (K,) from the track's frame `first` on."""
+    def compute_cost(self, first: int, place: np.ndarray) -> np.ndarray:
+        """Compute the cost (K,) of showing library frames at places (K,) of the period from the track's frame `first`
+        on.
+        """
         # place - time modulo the period; the table holds two periods, so the sum of two remainders needs no further
         # modulo
-        return self.table[(-first - self.start) % (len(self.table) // 2) :].take(self.place.take(frame))
+        return self.table[(-first - self.start) % (len(self.table) // 2) :].take(place)
 
 
 def build_lag_preference(library: Library, lag: float, variety: float, start: float) -> LagPreference | None:

@@ -39,7 +39,7 @@ def test_taste_likes_one_lag_against_the_clock(library):
     for at in (0, 45):
         lag = (ages - at) / library.fps - 10.0 - 0.9
         away = np.abs(lag / PERIOD - np.round(lag / PERIOD)) * PERIOD
-        cost = own.compute_cost(at, first + ages)
+        cost = own.compute_cost(at, own.place[first + ages])
         assert np.all(cost[away < PREFERRED_RANGE - 0.02] == 0.0) and cost.max() == np.float32(0.5)
     assert build_lag_preference(library, 0.9, 0.0, 10.0) is None
 

@@ -60,6 +60,17 @@ def test_of_some_joints_no_bit_differs_and_others_are_unknown(motion):
         assert np.array_equal(found[:, chain], every[:, chain]) and np.isnan(found[:, 3]).all()
 
 
+@pytest.mark.parametrize("joints", [None, (0, 1, 2, 3, 4, 5, 6, 7, 8, 9)])
+def test_few_frames_have_the_same_bits_as_many(joints):
+    random, tree = np.random.default_rng(4), (-1, 0, 1, 1, 0, 2, 4, 4, 6, 3, 9, 10)
+    skeleton = Skeleton(tuple(map(str, range(12))), tree, random.normal(size=(12, 3)))
+    root, local = random.normal(size=(250, 3)), quaternion.normalize(random.normal(size=(250, 12, 4)))
+    whole = compute_pose(skeleton, root, local, joints)
+    parts = [compute_pose(skeleton, root[at : at + 50], local[at : at + 50], joints) for at in range(0, 250, 50)]
+    for together, apart in zip(whole, map(np.concatenate, zip(*parts))):
+        assert np.isfinite(together[:, :10]).all() and np.array_equal(together, apart, equal_nan=True)
+
+
 def test_rotations_are_unit_continuous_and_read_only(motion):
     assert np.allclose(np.linalg.norm(motion.rotations, axis=-1), 1.0)
     assert np.all(np.sum(motion.rotations[1:] * motion.rotations[:-1], axis=-1) >= 0.0)
