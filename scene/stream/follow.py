@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 TICK, IDLE = 1.0 / 60.0, 0.25  # s between two timer calls, with and without a stream
 STATUS_SECONDS = 0.25  # s between two status updates
+_HOLD_SECONDS = 0.002  # s between two looks of a thread that waits
 MOST_BODIES = 20  # characters created in one stream: a sender that keeps changing its skeleton is stopped
 
 
@@ -238,6 +239,14 @@ def _take_hit(scene, stream: StreamSettings, received: ReceivedStream) -> HitMot
     for call in list(_on_hit):
         call(scene, stream, hit, seconds)
     return hit
+
+
+def wait_for_strikes() -> None:
+    """Wait, in a thread that plans, until the strikes that have just been noticed are taken: the work would slow down
+    the drawing after which they are.
+    """
+    while any(received.hits.is_hit_waiting for received in list(_streams.values())):
+        time.sleep(_HOLD_SECONDS)
 
 
 def take_strikes(scene: bpy.types.Scene) -> None:

@@ -41,7 +41,7 @@ def apply_rally(scene: bpy.types.Scene, new_rally: NewRally) -> None:
     """Apply a rally to characters and ball, and answer the user's strikes from now on."""
     stop_rally()
     make.session.store_library(new_rally.library, new_rally.order.unit)
-    _session.update(scene=scene.session_uid, means=new_rally.means, seen=None, latest={}, unwritten=set(),
+    _session.update(scene=scene.session_uid, means=new_rally.means, seen=None, latest={}, unwritten=set(), undrawn=0,
                     keys=rally_keys.RallyKeys(), drawn=compute_rally_seconds(scene), watchers=None, steps=0,
                     clock=RallyClock())
     _wait_for_strike(scene, new_rally.rally)
@@ -125,6 +125,7 @@ def answer_in_playback(scene: bpy.types.Scene) -> None:
     """Insert the answer to the user's strike, if it is planned, before a frame of the playback is evaluated."""
     if scene.session_uid != _session.get("scene") or scene.beyond_mocap_passes.made_of != PLAYED:
         return
+    _finish_pass(scene)  # this frame may be one that is not written yet
     if is_playing():
         _session["clock"].note_frame(time.monotonic(), compute_rally_seconds(scene))
     else:
@@ -143,6 +144,9 @@ def update_rally(scene: bpy.types.Scene) -> None:
         _end_rally("The scene has been updated or cleared: press Play Live to continue")
         return
     _session["drawn"] = compute_rally_seconds(scene)
+    if _session["undrawn"] == 1:
+        _finish_pass(scene)
+    _session["undrawn"] = max(_session["undrawn"] - 1, 0)
     _update_target(scene)
     _collect_answer()
     _show_watchers(scene)
@@ -154,9 +158,10 @@ def update_rally(scene: bpy.types.Scene) -> None:
         pass
     elif _session["pending"] is not None:
         _answer_strike(scene, target)
-    elif "job" not in _session:
+    else:
         _session["keys"].note_edits(scene)
-        _plan_ahead(scene, target)
+        if "job" not in _session:
+            _plan_ahead(scene, target)
     if get_current_rally().end - _session["drawn"] < LEFT_SECONDS:
         _session["rally"] = get_current_rally().keep_standing()
         _session["unwritten"] |= {*get_current_rally().players}
@@ -198,8 +203,15 @@ def _build_answer(library, one, hit: HitMotion, target: str, bounces: int, progr
 def _start_planning(request: AnswerRequest) -> None:
     """Plan an answer in a thread; another one that is being planned is cancelled."""
     order = _collect_order(request)
-    _session["job"] = request, background.Job("live", lambda progress, cancelled, _hurry: _build_answer(
-        *order, progress, cancelled))
+
+    def work(progress, cancelled, _hurry):
+        def is_cancelled() -> bool:
+            follow.wait_for_strikes()
+            return cancelled()
+
+        return _build_answer(*order, progress, is_cancelled)
+
+    _session["job"] = request, background.Job("live", work)
 
 
 def _collect_answer() -> None:
@@ -250,8 +262,8 @@ def _plan_ahead(scene, target: str) -> None:
 
 def _apply_pass(scene, piece: LivePass, hit: HitMotion | None = None, seconds: float = 0.0,
                 before_frame: bool = False) -> None:
-    """Insert a pass that answers a hit of `seconds` on the monotonic clock; what takes long is left out before a frame:
-    the update that follows does it.
+    """Insert a pass that answers a hit of `seconds` on the monotonic clock; what takes long is left to the updates that
+    follow, since the user waits for the next drawing.
     """
     from .watchers import PlannedWatchers
 
@@ -260,8 +272,9 @@ def _apply_pass(scene, piece: LivePass, hit: HitMotion | None = None, seconds: f
     begin, delay = _find_beginning(scene, seconds)
     if bpy.app.background:  # where edits are not watched
         _session["keys"].mark_edits()
-    next_rally = get_current_rally().add_pass(piece, begin)
-    if not _session["keys"].replace_pass(scene, next_rally, piece.motions, begin):
+    next_rally, is_playing_now = get_current_rally().add_pass(piece, begin), is_playing()
+    shown = scene.frame_current if is_playing_now else None
+    if not _session["keys"].replace_pass(scene, next_rally, piece.motions, begin, shown):
         if before_frame:
             return
         _session["keys"].write_all(scene, next_rally, piece.motions)
@@ -269,9 +282,21 @@ def _apply_pass(scene, piece: LivePass, hit: HitMotion | None = None, seconds: f
     _session["latest"][follow.find_main_stream(scene, piece.giver).number] = hit
     _wait_for_strike(scene, next_rally)
     _session["unwritten"] |= {*piece.motions}
+    # updates until the pass is drawn: before that drawing comes another one where a frame waits to be evaluated
+    _session["undrawn"] = 2 if before_frame else 1
+    if not is_playing_now:
+        _finish_pass(scene)
     scene.beyond_mocap_stream.target = ""
     _write_status(piece, (delay, time.monotonic() - seconds) if seconds else None)
     _add_note()
+
+
+def _finish_pass(scene) -> None:
+    """Write the keys of the last pass that are not shown yet, and let the other players watch it."""
+    _session["keys"].finish_pass(scene)
+    _session["undrawn"] = 0
+    if _session["watchers"] is not None:
+        _session["watchers"].start()
 
 
 def _show_watchers(scene) -> None:
