@@ -21,7 +21,7 @@ from ..core.live import Watcher, call_or_describe, is_playing
 from ..core.measure import frames_per_second
 from ..passes import generate as make
 from ..passes.settings import PLAYED
-from . import follow, rally_keys
+from . import follow, rally_keys, rally_status
 from .rally_clock import RallyClock
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def apply_rally(scene: bpy.types.Scene, new_rally: NewRally) -> None:
     follow.add_hit_call(receive_strike)
     follow.add_update_call(_update_or_end)
     follow.add_frame_call(_answer_or_end)
-    _write_status()
+    rally_status.write_status(get_current_rally())
 
 
 def stop_rally() -> None:
@@ -287,8 +287,8 @@ def _apply_pass(scene, piece: LivePass, hit: HitMotion | None = None, seconds: f
     if not is_playing_now:
         _finish_pass(scene)
     scene.beyond_mocap_stream.target = ""
-    _write_status(piece, (delay, time.monotonic() - seconds) if seconds else None)
-    _add_note()
+    rally_status.write_status(next_rally, piece, (delay, time.monotonic() - seconds) if seconds else None)
+    rally_status.add_note(_session["keys"])
 
 
 def _finish_pass(scene) -> None:
@@ -340,7 +340,7 @@ def _write_rest(scene) -> None:
     """Write the standing that follows the last passes; it is one step of undo with them."""
     _session["keys"].write_all(scene, get_current_rally(), sorted(_session["unwritten"]))
     _session["unwritten"] = set()
-    _add_note()
+    rally_status.add_note(_session["keys"])
     # who only goes on to stand makes no step
     if get_current_rally().passes > _session["steps"] and not bpy.app.background:
         _session["steps"] = get_current_rally().passes
@@ -381,28 +381,6 @@ def _end_rally(reason: str) -> None:
     stop_rally()
     status_texts = bpy.context.window_manager.beyond_mocap_streaming
     status_texts.playing, status_texts.played = False, reason
-
-
-def _write_status(piece: LivePass | None = None, delays: tuple[float, float] | None = None) -> None:
-    """Write the state of the rally for the panel; `delays`: s from the strike to the beginning of its answer in the
-    scene's time, and to its writing by the clock.
-    """
-    status_texts, one = bpy.context.window_manager.beyond_mocap_streaming, get_current_rally()
-    status_texts.playing = True
-    lines = [f"{one.holder} has the ball, passes so far: {one.passes}"]
-    if piece is not None:
-        lines.append(f"{piece.giver} played {piece.clip} to {piece.receiver}")
-        if delays is not None:
-            lines.append("The answer began {:.2f} s after the strike, by the clock {:.2f} s".format(*delays))
-        lines += piece.warnings[:2]
-    status_texts.played = "\n".join(lines)
-
-
-def _add_note() -> None:
-    """Add to the panel which edits of the user have been replaced."""
-    if note := _session["keys"].note:
-        bpy.context.window_manager.beyond_mocap_streaming.played += f"\n{note}"
-    _session["keys"].note = ""
 
 
 def _mark_edits(_scene, depsgraph) -> None:
