@@ -61,6 +61,7 @@ _streams: dict[tuple[int, int], ReceivedStream] = {}
 _on_hit: list = []
 _on_update: list = []
 _on_frame: list = []
+_skips = {"update": False}
 
 
 def add_hit_call(call) -> None:
@@ -76,6 +77,11 @@ def add_update_call(call) -> None:
 def add_frame_call(call) -> None:
     """Call `call(scene)` after each change of frame, before it is evaluated, until `remove_call`."""
     _on_frame.append(call)
+
+
+def skip_update() -> None:
+    """Leave out the timer's next update, which comes before the drawing for which the user waits."""
+    _skips["update"] = True
 
 
 def remove_call(call) -> None:
@@ -309,6 +315,9 @@ def _give_up(key: tuple[int, int], reason: str) -> None:
 def _run_timer() -> float:
     """Update the streams, and return the seconds until the next call."""
     write_stopped()
+    if _skips["update"]:
+        _skips["update"] = False
+        return TICK
     if not _streams and not _on_update:
         return IDLE
     if bpy.app.is_job_running("RENDER"):

@@ -41,7 +41,7 @@ def apply_rally(scene: bpy.types.Scene, new_rally: NewRally) -> None:
     """Apply a rally to characters and ball, and answer the user's strikes from now on."""
     stop_rally()
     make.session.store_library(new_rally.library, new_rally.order.unit)
-    _session.update(scene=scene.session_uid, means=new_rally.means, seen=None, latest={}, unwritten=set(), undrawn=0,
+    _session.update(scene=scene.session_uid, means=new_rally.means, seen=None, latest={}, unwritten=set(),
                     keys=rally_keys.RallyKeys(), drawn=compute_rally_seconds(scene), watchers=None, steps=0,
                     clock=RallyClock())
     _wait_for_strike(scene, new_rally.rally)
@@ -144,9 +144,7 @@ def update_rally(scene: bpy.types.Scene) -> None:
         _end_rally("The scene has been updated or cleared: press Play Live to continue")
         return
     _session["drawn"] = compute_rally_seconds(scene)
-    if _session["undrawn"] == 1:
-        _finish_pass(scene)
-    _session["undrawn"] = max(_session["undrawn"] - 1, 0)
+    _finish_pass(scene)
     _update_target(scene)
     _collect_answer()
     _show_watchers(scene)
@@ -282,10 +280,10 @@ def _apply_pass(scene, piece: LivePass, hit: HitMotion | None = None, seconds: f
     _session["latest"][follow.find_main_stream(scene, piece.giver).number] = hit
     _wait_for_strike(scene, next_rally)
     _session["unwritten"] |= {*piece.motions}
-    # updates until the pass is drawn: before that drawing comes another one where a frame waits to be evaluated
-    _session["undrawn"] = 2 if before_frame else 1
     if not is_playing_now:
         _finish_pass(scene)
+    elif before_frame:
+        follow.skip_update()
     scene.beyond_mocap_stream.target = ""
     rally_status.write_status(next_rally, piece, (delay, time.monotonic() - seconds) if seconds else None)
     rally_status.add_note(_session["keys"])
@@ -294,7 +292,6 @@ def _apply_pass(scene, piece: LivePass, hit: HitMotion | None = None, seconds: f
 def _finish_pass(scene) -> None:
     """Write the keys of the last pass that are not shown yet, and let the other players watch it."""
     _session["keys"].finish_pass(scene)
-    _session["undrawn"] = 0
     if _session["watchers"] is not None:
         _session["watchers"].start()
 
