@@ -19,6 +19,7 @@ import numpy as np
 from ..base.easing import smoothstep
 from ..base.errors import InputError
 from ..base.time_series import interpolate_columns
+from ..base.vectors import dot_products
 from ..library.library import Library
 from ..motion import quaternion
 from ..motion.humanoid import compute_heading
@@ -318,25 +319,40 @@ def _extend_standing(motion: Motion, sway_seconds: float, rate: float) -> Motion
 
 
 def continue_motion(before: PlayerTimeline, motion: Motion, at: float) -> PlayerTimeline:
-    """Continue a player's motion with `motion` from `at` s on, blended in over BLEND_SECONDS."""
-    root, rotations = _blend_in(before, motion, at)
-    past = np.clip(np.arange(round((at - before.start) * motion.fps)), 0, len(before.motion) - 1)
-    root = np.concatenate([before.motion.root_positions[past], root])
-    rotations = np.concatenate([before.motion.rotations[past], rotations])
-    return PlayerTimeline(before.start, replace(motion, root_positions=root, rotations=rotations))
+    """Continue a player's motion with `motion` from `at` s on, blended in over BLEND_SECONDS.
 
-
-def _blend_in(before: PlayerTimeline, motion: Motion, at: float) -> tuple[np.ndarray, np.ndarray]:
-    """Compute the root positions (T, 3) m and rotations (T, J, 4) of a motion that begins at `at` s, blended in."""
-    count = min(int(BLEND_SECONDS * motion.fps) + 1, len(motion))
+    Only the frames around the blend are computed, since a strike waits for it: all others are as they were before.
+    """
     first = round((at - before.start) * motion.fps)
-    frames = np.clip(np.arange(first, first + count), 0, len(before.motion) - 1)
-    weight = smoothstep(np.arange(count) / max(count - 1, 1))[:, None]
-    root, rotations = np.array(motion.root_positions), np.array(motion.rotations)
-    root[:count] = (1.0 - weight) * before.motion.root_positions[frames] + weight * root[:count]
-    old = quaternion.match_signs(before.motion.rotations[frames], rotations[:count])
-    rotations[:count] = quaternion.slerp(old, rotations[:count], weight)
-    return root, rotations
+    blend = _blend_in(before.motion, motion, first)
+    count = len(blend)
+    tail = motion.rotations[count:]
+    if len(tail):  # sign-continuous with the blend
+        tail = tail * np.where(dot_products(blend.rotations[-1], tail[0]) < 0.0, -1.0, 1.0)[:, None]
+    root = _join_frames(before.motion.root_positions, first, (blend.root_positions, motion.root_positions[count:]))
+    rotations = _join_frames(before.motion.rotations, first, (blend.rotations, tail))
+    return PlayerTimeline(before.start, Motion.from_stored(motion.skeleton, root, rotations, motion.fps))
+
+
+def _join_frames(before: np.ndarray, first: int, after: tuple[np.ndarray, ...]) -> np.ndarray:
+    """Join the first frames of `before` (T, ...), which holds its last one, with those that come after them."""
+    held = np.repeat(before[-1:], max(first - len(before), 0), axis=0)
+    joined = np.concatenate([before[:first], held, *after])
+    joined.setflags(write=False)
+    return joined
+
+
+def _blend_in(before: Motion, motion: Motion, first: int) -> Motion:
+    """Compute the frames of a motion that are blended in, where it begins on frame `first` of the one before."""
+    count = min(int(BLEND_SECONDS * motion.fps) + 1, len(motion))
+    frames = np.clip(np.arange(first - 1, first + count), 0, len(before) - 1)  # one more, for the signs
+    weight = smoothstep(np.arange(-1, count) / max(count - 1, 1))[:, None]
+    shown = np.clip(np.arange(-1, count), 0, None)
+    root = (1.0 - weight) * before.root_positions[frames] + weight * motion.root_positions[shown]
+    old = quaternion.match_signs(before.rotations[frames], motion.rotations[shown])
+    rotations = quaternion.slerp(old, motion.rotations[shown], weight)
+    rotations[0] = before.rotations[frames[0]]
+    return Motion(motion.skeleton, root, rotations, motion.fps).frames(1, count + 1)
 
 
 def _continue_ball(before: BallPath | None, path: BallPath, at: float, blend: float) -> BallPath:

@@ -13,6 +13,7 @@ from ...beyond_mocap.base.errors import InputError
 
 LINEAR = 1  # Keyframe.interpolation as foreach_set takes it
 GENERATED = 5  # Keyframe.type likewise: drawn dimmed in the editors
+_FEW_KEYS = 40  # of a curve with thousands: up to so many are written faster one by one
 
 PLACES = ("co", "handle_left", "handle_right")
 FIGURES = {  # other properties of a key, with the type that foreach_get returns
@@ -102,6 +103,7 @@ class WrittenKeys:
         self._places = _read_places(collect_curves(action, slot))
         self._frames = next(iter(self._places.values()))[::2].copy()
         self._edited = {key: np.zeros(len(self._frames), bool) for key in self._places}
+        self._is_part_unwritten = False
         self.is_current = True
 
     def can_replace(self, target: bpy.types.Object, first: float, channels: dict[str, tuple[str, np.ndarray]]) -> bool:
@@ -149,20 +151,47 @@ class WrittenKeys:
                 found[key].keyframe_points.foreach_set("co", self._places[key])
                 found[key].update()
 
-    def replace(self, target: bpy.types.Object, first: float, channels: dict[str, tuple[str, np.ndarray]]) -> None:
+    def replace(self, target: bpy.types.Object, first: float, channels: dict[str, tuple[str, np.ndarray]],
+                shown: float | None = None) -> None:
         """Replace the keys from a frame on; after the last value they hold it. Handles are left as they are.
 
         Args:
             target: the object, of which `can_replace` holds.
             first: the frame.
             channels: as `create_action`, all of the action's curves, values (F, n) for F frames.
+            shown: the frame that is drawn next: what comes later may be left to `write_others`, which has to follow
+                before anything else uses the keys. None: all are written.
         """
-        found, column = collect_curves(*find_playing_action(target)), self._find_column(first)
+        column = self._find_column(first)
         for path, (_, values) in channels.items():
             self._set_values(path, column, values)
-        for key, curve in found.items():
+        for edited in self._edited.values():
+            edited[column:] = False
+        end = len(self._frames) if shown is None else self._find_column(shown) + 2
+        self._is_part_unwritten = end - column <= _FEW_KEYS
+        if self._is_part_unwritten:
+            self._write_few(target, slice(column, end))
+        else:
+            self._write_all(target)
+
+    def write_others(self, target: bpy.types.Object) -> None:
+        """Write the keys that the last `replace` has left out."""
+        if self._is_part_unwritten:
+            self._write_all(target)
+            self._is_part_unwritten = False
+
+    def _write_all(self, target: bpy.types.Object) -> None:
+        """Write all keys: the time grows with their number, 75 ns each."""
+        for key, curve in collect_curves(*find_playing_action(target)).items():
             curve.keyframe_points.foreach_set("co", self._places[key])
-            self._edited[key][column:] = False
+        curve.update()  # one of them tells Blender
+
+    def _write_few(self, target: bpy.types.Object, columns: slice) -> None:
+        """Write some of many keys one by one, 2 µs each."""
+        for key, curve in collect_curves(*find_playing_action(target)).items():
+            places = self._places[key].reshape(-1, 2)[columns].tolist()
+            for point, place in zip(curve.keyframe_points[columns], places):
+                point.co = place
         curve.update()  # one of them tells Blender
 
     def _find_column(self, frame: float) -> int:

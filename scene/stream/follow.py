@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 TICK, IDLE = 1.0 / 60.0, 0.25  # s between two timer calls, with and without a stream
 STATUS_SECONDS = 0.25  # s between two status updates
+_HOLD_SECONDS = 0.002  # s between two looks of a thread that waits
 MOST_BODIES = 20  # characters created in one stream: a sender that keeps changing its skeleton is stopped
 
 
@@ -60,6 +61,7 @@ _streams: dict[tuple[int, int], ReceivedStream] = {}
 _on_hit: list = []
 _on_update: list = []
 _on_frame: list = []
+_skips = {"update": False}
 
 
 def add_hit_call(call) -> None:
@@ -75,6 +77,11 @@ def add_update_call(call) -> None:
 def add_frame_call(call) -> None:
     """Call `call(scene)` after each change of frame, before it is evaluated, until `remove_call`."""
     _on_frame.append(call)
+
+
+def skip_update() -> None:
+    """Leave out the timer's next update, which comes before the drawing for which the user waits."""
+    _skips["update"] = True
 
 
 def remove_call(call) -> None:
@@ -240,6 +247,14 @@ def _take_hit(scene, stream: StreamSettings, received: ReceivedStream) -> HitMot
     return hit
 
 
+def wait_for_strikes() -> None:
+    """Wait, in a thread that plans, until the strikes that have just been noticed are taken: the work would slow down
+    the drawing after which they are.
+    """
+    while any(received.hits.is_hit_waiting for received in list(_streams.values())):
+        time.sleep(_HOLD_SECONDS)
+
+
 def take_strikes(scene: bpy.types.Scene) -> None:
     """Pass on the strikes that have been detected, before a frame is evaluated: it already shows what answers them."""
     if not _on_frame or bpy.app.is_job_running("RENDER"):
@@ -300,6 +315,9 @@ def _give_up(key: tuple[int, int], reason: str) -> None:
 def _run_timer() -> float:
     """Update the streams, and return the seconds until the next call."""
     write_stopped()
+    if _skips["update"]:
+        _skips["update"] = False
+        return TICK
     if not _streams and not _on_update:
         return IDLE
     if bpy.app.is_job_running("RENDER"):

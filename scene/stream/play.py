@@ -21,7 +21,7 @@ from ..core.live import Watcher, call_or_describe, is_playing
 from ..core.measure import frames_per_second
 from ..passes import generate as make
 from ..passes.settings import PLAYED
-from . import follow, rally_keys
+from . import follow, rally_keys, rally_status
 from .rally_clock import RallyClock
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def apply_rally(scene: bpy.types.Scene, new_rally: NewRally) -> None:
     follow.add_hit_call(receive_strike)
     follow.add_update_call(_update_or_end)
     follow.add_frame_call(_answer_or_end)
-    _write_status()
+    rally_status.write_status(get_current_rally())
 
 
 def stop_rally() -> None:
@@ -125,6 +125,7 @@ def answer_in_playback(scene: bpy.types.Scene) -> None:
     """Insert the answer to the user's strike, if it is planned, before a frame of the playback is evaluated."""
     if scene.session_uid != _session.get("scene") or scene.beyond_mocap_passes.made_of != PLAYED:
         return
+    _finish_pass(scene)  # this frame may be one that is not written yet
     if is_playing():
         _session["clock"].note_frame(time.monotonic(), compute_rally_seconds(scene))
     else:
@@ -143,6 +144,7 @@ def update_rally(scene: bpy.types.Scene) -> None:
         _end_rally("The scene has been updated or cleared: press Play Live to continue")
         return
     _session["drawn"] = compute_rally_seconds(scene)
+    _finish_pass(scene)
     _update_target(scene)
     _collect_answer()
     _show_watchers(scene)
@@ -154,9 +156,10 @@ def update_rally(scene: bpy.types.Scene) -> None:
         pass
     elif _session["pending"] is not None:
         _answer_strike(scene, target)
-    elif "job" not in _session:
+    else:
         _session["keys"].note_edits(scene)
-        _plan_ahead(scene, target)
+        if "job" not in _session:
+            _plan_ahead(scene, target)
     if get_current_rally().end - _session["drawn"] < LEFT_SECONDS:
         _session["rally"] = get_current_rally().keep_standing()
         _session["unwritten"] |= {*get_current_rally().players}
@@ -198,8 +201,15 @@ def _build_answer(library, one, hit: HitMotion, target: str, bounces: int, progr
 def _start_planning(request: AnswerRequest) -> None:
     """Plan an answer in a thread; another one that is being planned is cancelled."""
     order = _collect_order(request)
-    _session["job"] = request, background.Job("live", lambda progress, cancelled, _hurry: _build_answer(
-        *order, progress, cancelled))
+
+    def work(progress, cancelled, _hurry):
+        def is_cancelled() -> bool:
+            follow.wait_for_strikes()
+            return cancelled()
+
+        return _build_answer(*order, progress, is_cancelled)
+
+    _session["job"] = request, background.Job("live", work)
 
 
 def _collect_answer() -> None:
@@ -250,8 +260,8 @@ def _plan_ahead(scene, target: str) -> None:
 
 def _apply_pass(scene, piece: LivePass, hit: HitMotion | None = None, seconds: float = 0.0,
                 before_frame: bool = False) -> None:
-    """Insert a pass that answers a hit of `seconds` on the monotonic clock; what takes long is left out before a frame:
-    the update that follows does it.
+    """Insert a pass that answers a hit of `seconds` on the monotonic clock; what takes long is left to the updates that
+    follow, since the user waits for the next drawing.
     """
     from .watchers import PlannedWatchers
 
@@ -260,8 +270,9 @@ def _apply_pass(scene, piece: LivePass, hit: HitMotion | None = None, seconds: f
     begin, delay = _find_beginning(scene, seconds)
     if bpy.app.background:  # where edits are not watched
         _session["keys"].mark_edits()
-    next_rally = get_current_rally().add_pass(piece, begin)
-    if not _session["keys"].replace_pass(scene, next_rally, piece.motions, begin):
+    next_rally, is_playing_now = get_current_rally().add_pass(piece, begin), is_playing()
+    shown = scene.frame_current if is_playing_now else None
+    if not _session["keys"].replace_pass(scene, next_rally, piece.motions, begin, shown):
         if before_frame:
             return
         _session["keys"].write_all(scene, next_rally, piece.motions)
@@ -269,9 +280,20 @@ def _apply_pass(scene, piece: LivePass, hit: HitMotion | None = None, seconds: f
     _session["latest"][follow.find_main_stream(scene, piece.giver).number] = hit
     _wait_for_strike(scene, next_rally)
     _session["unwritten"] |= {*piece.motions}
+    if not is_playing_now:
+        _finish_pass(scene)
+    elif before_frame:
+        follow.skip_update()
     scene.beyond_mocap_stream.target = ""
-    _write_status(piece, (delay, time.monotonic() - seconds) if seconds else None)
-    _add_note()
+    rally_status.write_status(next_rally, piece, (delay, time.monotonic() - seconds) if seconds else None)
+    rally_status.add_note(_session["keys"])
+
+
+def _finish_pass(scene) -> None:
+    """Write the keys of the last pass that are not shown yet, and let the other players watch it."""
+    _session["keys"].finish_pass(scene)
+    if _session["watchers"] is not None:
+        _session["watchers"].start()
 
 
 def _show_watchers(scene) -> None:
@@ -315,7 +337,7 @@ def _write_rest(scene) -> None:
     """Write the standing that follows the last passes; it is one step of undo with them."""
     _session["keys"].write_all(scene, get_current_rally(), sorted(_session["unwritten"]))
     _session["unwritten"] = set()
-    _add_note()
+    rally_status.add_note(_session["keys"])
     # who only goes on to stand makes no step
     if get_current_rally().passes > _session["steps"] and not bpy.app.background:
         _session["steps"] = get_current_rally().passes
@@ -356,28 +378,6 @@ def _end_rally(reason: str) -> None:
     stop_rally()
     status_texts = bpy.context.window_manager.beyond_mocap_streaming
     status_texts.playing, status_texts.played = False, reason
-
-
-def _write_status(piece: LivePass | None = None, delays: tuple[float, float] | None = None) -> None:
-    """Write the state of the rally for the panel; `delays`: s from the strike to the beginning of its answer in the
-    scene's time, and to its writing by the clock.
-    """
-    status_texts, one = bpy.context.window_manager.beyond_mocap_streaming, get_current_rally()
-    status_texts.playing = True
-    lines = [f"{one.holder} has the ball, passes so far: {one.passes}"]
-    if piece is not None:
-        lines.append(f"{piece.giver} played {piece.clip} to {piece.receiver}")
-        if delays is not None:
-            lines.append("The answer began {:.2f} s after the strike, by the clock {:.2f} s".format(*delays))
-        lines += piece.warnings[:2]
-    status_texts.played = "\n".join(lines)
-
-
-def _add_note() -> None:
-    """Add to the panel which edits of the user have been replaced."""
-    if note := _session["keys"].note:
-        bpy.context.window_manager.beyond_mocap_streaming.played += f"\n{note}"
-    _session["keys"].note = ""
 
 
 def _mark_edits(_scene, depsgraph) -> None:

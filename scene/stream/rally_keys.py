@@ -1,7 +1,9 @@
 """The keys of a rally's players and ball.
 
 A pass replaces the keys from its beginning on, in the actions that are there: those before it stay, so that a step of
-undo that is made meanwhile has them all. Its players' long standing follows with `write_all`, when there is time.
+undo that is made meanwhile has them all. While the scene plays, only the frames that are drawn next are written at
+once, since the user waits for them; `finish_pass` writes the rest of the pass after that drawing. The long standing of
+its players follows with `write_all`, when there is time.
 """
 
 from __future__ import annotations
@@ -47,8 +49,18 @@ class RallyKeys:
         for keys in (*self._players.values(), *([self._ball] if self._ball else ())):
             keys.is_current = False
 
+    def finish_pass(self, scene: bpy.types.Scene) -> None:
+        """Write the keys of the last pass that `replace_pass` has left out."""
+        rows = scene.beyond_mocap_passes.players
+        for name, keys in self._players.items():
+            if name in rows and rows[name].body is not None:
+                keys.write_others(rows[name].body)
+        if self._ball is not None and scene.beyond_mocap_passes.rally is not None:
+            self._ball.write_others(scene.beyond_mocap_passes.rally)
+
     def note_edits(self, scene: bpy.types.Scene) -> None:
-        """Compare the keys of one player if they are marked, while nothing else is to do: it takes some milliseconds.
+        """Compare the keys of one player if they are marked: it takes some milliseconds, for which a strike would have
+        to wait.
         """
         rows = scene.beyond_mocap_passes.players
         for name, keys in self._players.items():
@@ -62,6 +74,7 @@ class RallyKeys:
         """
         from ...beyond_mocap.passes.passes import build_ball
 
+        self.finish_pass(scene)
         rows, start = _find_rows(scene, names), float(scene.beyond_mocap_passes.start_frame)
         replaced = []
         for name, row in rows.items():
@@ -84,14 +97,21 @@ class RallyKeys:
             self._ball.copy_edits(ball, old)
         frame_range.extend_range(scene, start + float(rally.ball.times[-1]) * frames_per_second(scene))
 
-    def replace_pass(self, scene: bpy.types.Scene, rally: Rally, names: Iterable[str], begin: float) -> bool:
-        """Replace the keys of the named players and the ball by the pass that has just been added to a rally, from
-        `begin` s until they have stood for a while.
+    def replace_pass(self, scene: bpy.types.Scene, rally: Rally, names: Iterable[str], begin: float,
+                     shown: float | None = None) -> bool:
+        """Replace the keys of the named players and the ball by the pass that has just been added to a rally.
 
+        Args:
+            scene: the scene.
+            rally: the rally with the pass.
+            names: of the players.
+            begin: s from which on they are replaced, until the players have stood for a while.
+            shown: the scene's frame that is drawn next, as in `WrittenKeys.replace`; None: all keys are written.
         Returns:
             Whether it was possible; otherwise `write_all` is needed, since the keys have been changed by others or end
             before that.
         """
+        self.finish_pass(scene)
         until, fps = rally.ready_time + AT_ONCE, frames_per_second(scene)
         first, ball = scene.beyond_mocap_passes.start_frame + begin * fps, scene.beyond_mocap_passes.rally
         rows = _find_rows(scene, names)
@@ -107,7 +127,7 @@ class RallyKeys:
         if edited:
             self.note = f"The pass has replaced keys that were edited after its beginning: {', '.join(edited)}"
         for keys, *change in changes:
-            keys.replace(*change)
+            keys.replace(*change, shown)
         return True
 
 

@@ -15,7 +15,7 @@ KIND = "live watchers"
 
 
 class PlannedWatchers:
-    """How all but passer and receiver watch a pass, being planned.
+    """How all but passer and receiver watch a pass; planned in a thread once it is started.
 
     Args:
         library: the library.
@@ -25,17 +25,23 @@ class PlannedWatchers:
     """
 
     def __init__(self, library: Library, rally: Rally, live_pass: LivePass, begin: float):
-        self._pass, self.begin = live_pass, begin
-        self._job = background.Job(KIND, lambda progress, cancelled, _hurry: _build_watchers(
-            library, rally, live_pass, progress, cancelled))
+        self._library, self._rally, self._pass, self.begin = library, rally, live_pass, begin
+        self._job: background.Job | None = None
+
+    def start(self) -> None:
+        """Start to plan, once."""
+        if self._job is None:
+            self._job = background.Job(KIND, lambda progress, cancelled, _hurry: _build_watchers(
+                self._library, self._rally, self._pass, progress, cancelled))
 
     def poll(self) -> bool:
         """Return True once planning has ended."""
-        return self._job.poll() or self._job.is_ended
+        return self._job is not None and (self._job.poll() or self._job.is_ended)
 
     def cancel(self) -> None:
         """Stop planning."""
-        self._job.cancel()
+        if self._job is not None:
+            self._job.cancel()
 
     def add_to(self, rally: Rally, at: float) -> tuple[Rally, tuple[str, ...]]:
         """Build the rally in which they watch from `at` s on, once planning has ended.
@@ -48,9 +54,10 @@ class PlannedWatchers:
         from ...beyond_mocap.base.errors import UserCancelledError
         from ...beyond_mocap.passes.live_watchers import add_watchers
 
-        if self._job.error is not None and not isinstance(self._job.error, UserCancelledError):
-            raise self._job.error
-        motions = self._job.result or {}
+        job = self._job
+        if job is not None and job.error is not None and not isinstance(job.error, UserCancelledError):
+            raise job.error
+        motions = (job.result if job is not None else None) or {}
         return add_watchers(rally, motions, self._pass, self.begin, at), tuple(motions)
 
 

@@ -140,16 +140,15 @@ def players_stand():
 def measure_answer(port, label):
     """Stream a clip with a strike to a port; say when its answer begins. In the scene that is the same however slowly
     the view is drawn."""
-    session, hit = import_module("scene.stream.play")._session, find_streamed_hit()
-    target = import_module("scene.stream.play").find_target(get_scene())
+    play, hit = import_module("scene.stream.play"), find_streamed_hit()
 
     def is_planned():
-        ahead = session["ahead"]  # another one as soon as the others watch
-        return session["watchers"] is None and ahead.find(ahead.request_for(hit, target, 0)) is not None
+        """For now: the end of the last stream may look like one more strike, after which another player has the ball"""
+        ahead, target = play._session["ahead"], play.find_target(get_scene())
+        return play._session["watchers"] is None and ahead.find(ahead.request_for(hit, target, 0)) is not None
 
-    yield from wait_until(is_planned, what="the answer is planned ahead")
-    yield from wait_until(players_stand)
-    names = get_rally().holder, target
+    yield from wait_until(lambda: players_stand() and is_planned(), what="the answer is planned ahead")
+    names = get_rally().holder, play.find_target(get_scene())
     before = [read_keys(name) for name in names]
     with AnswerTimes(port) as noted:
         yield from wait_until(lambda: len(noted.drawings) > 4)

@@ -28,6 +28,7 @@ _LEAST_SECONDS = 0.5  # s of frames without which nothing is analysed
 _SETTLE_SECONDS = 0.05  # s by which a hit motion has to be over
 _PAUSES = 0.015, 0.04  # s between two looks of the thread, at least and at most; between them as long as a look takes
 _ANSWER_PAUSE = 0.2  # s after a strike, which is being answered: looks would slow that down
+_TAKING_SECONDS = 0.5  # s for which a strike that has been found is expected to be taken
 _LATEST_ARRIVAL = 1.0  # s from sender to listener; a stream that says more has another clock
 _LOOK_SECONDS = 0.1  # s between two moments that are analysed at most: a strike shows for some 0.2 s while under way
 
@@ -51,12 +52,18 @@ class LiveHits:
         self.sides = ((side,) if side else ("left", "right")) if sided else ("",)
         self._after = self._seen_until = float("-inf")
         self._last_number = 0
+        self._found_at = float("-inf")
         self._found: queue.SimpleQueue[tuple[HitMotion, float] | Exception] = queue.SimpleQueue()
 
     def start(self) -> LiveHits:
         """Start the thread; it ends with the listener."""
         threading.Thread(target=self._watch, name="beyond_mocap strikes", daemon=True).start()
         return self
+
+    @property
+    def is_hit_waiting(self) -> bool:
+        """Whether a strike has just been found that is not taken yet."""
+        return not self._found.empty() and time.monotonic() < self._found_at + _TAKING_SECONDS
 
     def take_hit(self) -> tuple[HitMotion, float] | None:
         """Take what the thread has found: as `find_new_hit`, which it also raises."""
@@ -74,6 +81,7 @@ class LiveHits:
             start, found = time.monotonic(), None
             try:
                 if (found := self.find_new_hit()) is not None:
+                    self._found_at = time.monotonic()
                     self._found.put(found)
             except Exception as error:  # raised where it is taken
                 if str(error) != reported:

@@ -170,7 +170,8 @@ def play_and_strike(play, scene, core, clock, frames, in_playback):
 
 def test_an_answer_begins_with_the_strike(playing, room, core, monkeypatch):
     """However slow the playback is: the strike is dated by when the frames came, also where it is noticed after the
-    last one, and where the playback drops none. What was drawn already stays, and what was before the strike.
+    last one, and where the playback drops none. What was drawn already stays, and what was before the strike. Only what
+    is drawn next is written at once, and all before the frame after it.
     """
     play, clock = room("stream.play"), SimpleNamespace(moment=0.0)
     monkeypatch.setattr(play, "is_playing", lambda: True)
@@ -182,7 +183,13 @@ def test_an_answer_begins_with_the_strike(playing, room, core, monkeypatch):
         ({99: 16, 100: 40}, 58, False), ({99: 39, 100: 40}, 41, False), ({100: 40}, 40, False),
     ):
         play_and_strike(play, playing, core, clock, frames, in_playback)
-        changed = np.abs(read_keys(room, playing, "Ann")[1] - first).max(axis=(1, 2)) > 1e-5
+        count = playing.frame_current + 1 - 5
+        at_once = read_keys(room, playing, "Ann")[1]
+        assert np.array_equal(at_once[count + 1 :], first[count + 1 :])
+        play.answer_in_playback(playing)  # of the next frame
+        last = read_keys(room, playing, "Ann")[1]
+        assert np.array_equal(at_once[:count], last[:count]) and np.abs(last - first)[count + 20 :].max() > 0.1
+        changed = np.abs(last - first).max(axis=(1, 2)) > 1e-5
         assert 5 + np.argmax(changed) == begins + 1, "where it blends in, the first frame is the old one"
         play._session.update({**stand, "watchers": None, "drawn": 0.0, "clock": type(stand["clock"])()})
         play._session.pop("job", None)
