@@ -198,7 +198,7 @@ def _identify_library_files(library: Path) -> set[tuple[int, int]]:
     found = find_recordings(library)
     stems = [os.path.splitext(path)[0] for path in found]
     beside = [stem + ending for stem in stems for ending in (".txt", ".ball.csv")]
-    files = (*found, *filter(os.path.exists, beside), *find_tables(library, found))
+    files = [*map(str, found), *filter(os.path.exists, beside), *map(str, find_tables(library, found))]
     return {_identify(path) for path in files}
 
 
