@@ -27,7 +27,8 @@ from ..ball_detour import lead_ball_around_body
 from .recorded_placement import Placements
 from .recorded_touches import NEAR, find_nearest_parts, find_shown_touches, find_touches
 
-_JUMP = 1.0  # m between two clips' balls from which on they are not joined
+_JUMP = 1.0  # m within a frame from which on a shown ball is reported to jump
+_JOINED = 4.0  # m up to which two clips' balls are joined: longer dribbles than that are another ball
 _FREE_SECONDS = 3.0  # for which a ball moves on as recorded, beyond the piece that shows its clip
 _JOIN_SECONDS = 0.3  # before and after a transition over which two clips' balls are joined
 
@@ -153,7 +154,7 @@ def _join_pieces(ball: np.ndarray, edges: Sequence[int], touches: np.ndarray, re
     for start, edge, end in zip(edges, edges[1:], edges[2:]):
         before_last = ball[edge - 2] if edge - start > 1 and np.isfinite(ball[edge - 2]).all() else ball[edge - 1]
         jump = ball[edge] - 2.0 * ball[edge - 1] + before_last
-        if not np.linalg.norm(jump) <= _JUMP:  # also where one of them is not known
+        if not np.linalg.norm(jump) <= _JOINED:  # also where one of them is not known
             continue
         first, last = touches[touches < edge].max(initial=start - 1), touches[touches >= edge].min(initial=end)
         before, behind = min(reach, edge - 1 - first), min(reach, last - edge)

@@ -127,6 +127,14 @@ def test_the_ball_rolls_on_the_track_without_jumps(take):
     assert np.linalg.norm(np.diff(ball, axis=0), axis=1).max() * FPS < 8.0
 
 
+def test_a_ball_does_not_leap_where_many_clips_meet(dribbles_of, plan, track_of):
+    """Stops, starts and turns: some pairs of clips have their balls more than a metre apart."""
+    harsh = track_of(lambda t: np.where(t % 1.5 < 0.75, 4.0, 1.0), 12.0, turn=0.9)
+    take = synthesize(dribbles_of(-OFF), replace(plan, track=harsh))
+    step = np.linalg.norm(np.diff(take.ball.positions, axis=0), axis=1)
+    assert len(take.seams) > 4 and np.nanmax(step) < 0.6
+
+
 def test_an_update_carries_the_ball_too(take, dribbles, track_of, timeline_of):
     slower = track_of(lambda t: np.where((t < 4.0) | (t > 7.5), 1.4, 2.8), 10.0, turn=0.25)
     timeline = timeline_of((4.5, 7.0, "dribble jogging front"))
