@@ -100,18 +100,17 @@ def find_planned_headings(view: View) -> np.ndarray | None:
     return np.interp(times, track.times, track.heading, left=np.nan, right=np.nan)
 
 
-def measure_naturalness(view: View, planned: np.ndarray | None, requested: Timeline | None) -> dict:
+def measure_naturalness(view: View, planned: np.ndarray | None, asked: np.ndarray) -> dict:
     """Measure what the eye sees of a take, beside the same of the recordings that it uses.
 
     Args:
         view: the take beside its library and track.
         planned: (T,) rad, its planned heading, or None.
-        requested: the user's own timeline, or None.
+        asked: (T,) bool of `find_asked_frames`.
     Returns:
         The report's group.
     """
     course, count = view.course, len(view.course.heading)
-    asked = _find_asked_frames(view, requested)
     postures = NormalPostures({}) if view.library is None else view.library.normal_postures
     out = measure_course_figures([course], [np.ones(count, dtype=bool)], [_sample_course(view, asked)], postures)
     if not postures.regions:
@@ -216,8 +215,13 @@ def summarize_arms(depth: np.ndarray) -> dict:
     return {"inside_share": float(np.mean(depth > 0.0)), "depth_m_max": max(0.0, float(depth.max()))}
 
 
-def _find_asked_frames(view: View, requested: Timeline | None) -> np.ndarray:
-    """Find the frames (T,) bool whose labels ask for other postures than those of locomotion."""
+def find_asked_frames(view: View, requested: Timeline | None) -> np.ndarray:
+    """Find the frames (T,) bool whose labels ask for other postures than those of locomotion.
+
+    Args:
+        view: the take, T frames.
+        requested: the user's own timeline, or None.
+    """
     asked = np.zeros(view.count, dtype=bool)
     if requested is not None:
         labels = labels_per_frame(requested, view.played.times)
@@ -245,18 +249,17 @@ def find_jolts(view: View) -> np.ndarray:
 
 
 def list_naturalness_messages(
-    view: View, planned: np.ndarray | None, requested: Timeline | None
+    view: View, planned: np.ndarray | None, asked: np.ndarray
 ) -> tuple[list[TimedMessage], list[TimedMessage]]:
     """List a line for each kind of event of the take: warnings, and notes about what ball, play and labels ask for.
 
     Args:
         view: the take beside its library and track.
         planned: (T,) rad, its planned heading, or None.
-        requested: the user's own timeline, or None.
+        asked: (T,) bool of `find_asked_frames`.
     """
     known = None if planned is None or not np.isfinite(planned).any() else fill_plan(planned)
-    asked = _sample_course(view, _find_asked_frames(view, requested))
-    warnings, notes = list_event_messages(view.course, view.played.start_time, known, asked)
+    warnings, notes = list_event_messages(view.course, view.played.start_time, known, _sample_course(view, asked))
     if view.reference is None:
         return warnings, notes
     ratios = movement.compute_jerk_ratios(view.jerk, view.speed, view.reference.jerk_p95)

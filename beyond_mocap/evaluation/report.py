@@ -19,7 +19,12 @@ from ..synthesis.quality.targets import find_target
 from ..synthesis.take import Take
 from . import figures, naturalness_figures, physics_figures, touch_figures
 from .annotation_similarity import measure_annotation_similarity
-from .naturalness_figures import find_planned_headings, list_naturalness_messages, measure_naturalness
+from .naturalness_figures import (
+    find_asked_frames,
+    find_planned_headings,
+    list_naturalness_messages,
+    measure_naturalness,
+)
 from .physics_figures import list_physics_notes, measure_physics
 from .touch_figures import list_touch_messages, measure_touches
 from .touch_view import TouchView
@@ -87,14 +92,14 @@ def evaluate_played(
     view = View(played, track, timeline, library)
     touch_view = TouchView(view)
     user_timeline = timeline if requested is None else requested
-    heading = find_planned_headings(view)
-    events, notes = list_naturalness_messages(view, heading, user_timeline)
+    heading, asked = find_planned_headings(view), find_asked_frames(view, user_timeline)
+    events, notes = list_naturalness_messages(view, heading, asked)
     report = {
         "version": VERSION, "seed": None, "fps": played.motion.fps, "frames": len(played.motion),
         "duration_s": played.motion.duration, "seconds": dict.fromkeys(SECONDS), **figures.measure_path_errors(view),
         "keys": figures.measure_key_moments(view), **figures.measure_feet(view),
         **figures.measure_corrections(view, ik_miss), **figures.measure_transitions(view),
-        **figures.measure_poses(view), **measure_naturalness(view, heading, user_timeline),
+        **figures.measure_poses(view), **measure_naturalness(view, heading, asked),
         **measure_physics(view), **measure_touches(touch_view),
         "annotation_similarity": measure_annotation_similarity(view),
         "warnings": [*figures.list_warnings(view, ik_miss, requested), *events, *list_touch_messages(touch_view)],

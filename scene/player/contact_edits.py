@@ -2,7 +2,6 @@
 the newest take they belong to.
 """
 
-
 from typing import NamedTuple
 
 import bpy

@@ -40,7 +40,7 @@ def read_pins(scene: bpy.types.Scene, player) -> "tuple[core_pin.Pin, ...]":
     for pin in player.pins:
         if pin.target is not None and pin.target.name in scene.objects:
             place = np.array(pin.target.matrix_world.translation, dtype=float) * metres
-            hold = 0.0 if pin.part == "ball" else round(pin.hold, 6)
+            hold = 0.0 if pin.part == core_pin.BALL else round(pin.hold, 6)
             found.append(core_pin.Pin(round(pin.time, 6), pin.part, tuple(np.round(place, 6)), hold))
     return tuple(found)
 

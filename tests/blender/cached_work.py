@@ -39,7 +39,7 @@ def _build_view(values: dict) -> MappingProxyType:
 
 class _Packer(pickle.Pickler):
     """Values as bytes, the same for equal values. Libraries go by what they were built from, since they are large and
-    nobody changes one; a function within a function has no form, and is equal to itself alone; the folder of the
+    stay as they are; a function within a function has no form, and is equal to itself alone; the folder of the
     session's files has another name in each."""
 
     def __init__(self, out, cache: "WorkCache"):

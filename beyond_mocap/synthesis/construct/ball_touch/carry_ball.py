@@ -28,7 +28,7 @@ from .recorded_placement import Placements
 from .recorded_touches import NEAR, find_nearest_parts, find_shown_touches, find_touches
 
 _JUMP = 1.0  # m within a frame from which on a shown ball is reported to jump
-_JOINED = 4.0  # m up to which two clips' balls are joined: longer dribbles than that are another ball
+_JOINED = 4.0  # m up to which two clips' balls are joined; beyond it, it is another ball
 _FREE_SECONDS = 3.0  # for which a ball moves on as recorded, beyond the piece that shows its clip
 _JOIN_SECONDS = 0.3  # before and after a transition over which two clips' balls are joined
 
