@@ -19,6 +19,8 @@ from types import FunctionType, MappingProxyType
 
 import bpy
 import numpy as np
+import scipy
+import sklearn
 
 FUNCTIONS = {
     "evaluation.report": "evaluate", "library.library": "_build_synthetic_library",
@@ -30,7 +32,7 @@ OPERATORS = (
     "clean_markers", "kick_at_target", "learn_words", "make_match", "passes_make", "reconstruct_markers", "stream_play",
     "throw_at_target",
 )  # fmt: skip
-"""Operators whose work is more than one of these functions, or reads files."""
+"""Operators whose work is more than one of these functions, or reads or writes files: each session does it."""
 
 
 def _build_view(values: dict) -> MappingProxyType:
@@ -88,7 +90,7 @@ class WorkCache:
 
     def __init__(self, core: str, base: Path, folder: Path | None):
         """core: the core's dotted name; base: folder of this session's files; folder: what other runs of the same
-        core, Python and numpy share, None for none."""
+        core, Python and libraries share, None for none."""
         self.library, self.kept, self.results = import_module(f"{core}.library.library").Library, {}, {}
         self.base, self.folder = str(base), folder
         if folder is not None:
@@ -106,8 +108,12 @@ class WorkCache:
         """The value again."""
         return _Unpacker(packed, self).load()
 
-    def keep_results(self, work):
-        """A function that does `work` once for equal arguments; those for progress and cancelling do not count."""
+    def _find_file(self, order: bytes) -> Path:
+        return self.folder / hashlib.sha256(self.version + order).hexdigest()
+
+    def keep_results(self, work, shared: bool = True):
+        """A function that does `work` once for equal arguments; those for progress and cancelling do not count.
+        shared: other sessions use the result too, for work that neither reads nor writes files."""
 
         def work_once(*args, **named):
             if threading.current_thread() is not threading.main_thread():
@@ -115,7 +121,7 @@ class WorkCache:
             asked = [value for value in args if not callable(value)], [
                 item for item in sorted(named.items()) if not callable(item[1])]
             order, is_shared = self.pack((work.__module__, work.__qualname__, asked))
-            file = self.folder / hashlib.sha256(self.version + order).hexdigest() if self.folder and is_shared else None
+            file = self._find_file(order) if self.folder and shared and is_shared else None
             if order not in self.results and file is not None and file.is_file():
                 self.results[order] = file.read_bytes()
             if order in self.results:
@@ -132,8 +138,8 @@ class WorkCache:
 
 
 def _digest_version(folder: Path) -> bytes:
-    """A digest of Python, numpy and all files of the core: what other code worked out is not used."""
-    found = hashlib.sha256(f"{sys.version} {np.__version__}".encode())
+    """A digest of Python, the libraries and all files of the core: what other code worked out is not used."""
+    found = hashlib.sha256(f"{sys.version} {np.__version__} {scipy.__version__} {sklearn.__version__}".encode())
     for path in sorted(path for path in folder.rglob("*") if path.is_file() and path.suffix != ".pyc"):
         found.update(str(path.relative_to(folder)).encode() + path.read_bytes())
     return found.digest()
@@ -159,7 +165,7 @@ def cache_functions(monkeypatch, core: str, base: Path, folder: Path | None) -> 
 
 
 def cache_operators(monkeypatch, cache: WorkCache) -> None:
-    """The same for OPERATORS, where no test changes the files that they read."""
+    """The same for OPERATORS within a session, where no test changes the files that they read or write."""
     for name in OPERATORS:
         operator = getattr(bpy.types, f"BEYOND_MOCAP_OT_{name}")
-        monkeypatch.setattr(operator, "run_job", staticmethod(cache.keep_results(operator.run_job)))
+        monkeypatch.setattr(operator, "run_job", staticmethod(cache.keep_results(operator.run_job, shared=False)))
