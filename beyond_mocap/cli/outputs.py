@@ -13,6 +13,7 @@ from pathlib import Path
 
 from ..base.errors import InputError, UserCancelledError
 from ..base.settings.options import parse_path
+from ..files.file_names import identify_file
 
 Writer = Callable[..., Sequence[str] | None]
 """Writes a take, or the result of the verb `match`, to a file, and joints above a take's hips where they are given:
@@ -187,11 +188,11 @@ def check_outputs(*paths: Path | None, reserved: tuple[Path | None, ...] = (), l
             problem = "is both an output and another file of the command"
             raise InputError(path, problem, "different files", "rename one of them")
         used.add(path.resolve())
-        if recorded and path.exists() and _identify(path) in recorded:
+        if recorded and path.exists() and identify_file(path) in recorded:
             raise InputError(path, f"is a file of the library {library}", "another file", "choose another name")
 
 
-def _identify_library_files(library: Path) -> set[tuple[int, int]]:
+def _identify_library_files(library: Path) -> set[tuple[int, int] | str]:
     """Identify the recordings, labels and balls of a library, also where links lead to them."""
     from ..library.scan import find_recordings, find_tables
 
@@ -199,13 +200,7 @@ def _identify_library_files(library: Path) -> set[tuple[int, int]]:
     stems = [os.path.splitext(path)[0] for path in found]
     beside = [stem + ending for stem in stems for ending in (".txt", ".ball.csv")]
     files = [*map(str, found), *filter(os.path.exists, beside), *map(str, find_tables(library, found))]
-    return {_identify(path) for path in files}
-
-
-def _identify(path: str | Path) -> tuple[int, int]:
-    """Identify a file by its device and number there, which all links to it share."""
-    status = os.stat(path)
-    return status.st_dev, status.st_ino
+    return {identify_file(path) for path in files}
 
 
 def add_take_files(verb) -> None:

@@ -1,9 +1,11 @@
-"""Names that files may have on every system."""
+"""Names that files may have on every system, and which names are of one file."""
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable
+from pathlib import Path
 
 _MAX_NAME = 100  # characters of a file name
 _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\.|$)", re.IGNORECASE)
@@ -18,6 +20,21 @@ def avoid_reserved_name(name: str) -> str:
         A name that every system can have.
     """
     return f"_{name}" if _RESERVED.match(name) else name
+
+
+def identify_file(path: str | Path) -> tuple[int, int] | str:
+    """Identify an existing file or folder, the same for all links to it.
+
+    Args:
+        path: of the file.
+    Returns:
+        Its device and its number there; its resolved path on file systems that number no files, such as some network
+        shares on Windows.
+    Raises:
+        OSError: if there is none.
+    """
+    status = os.stat(path)
+    return (status.st_dev, status.st_ino) if status.st_ino else os.path.realpath(path)
 
 
 def build_file_names(ids: Iterable[str]) -> dict[str, str]:

@@ -19,6 +19,7 @@ from ..base.errors import InputError, build_read_error, describe_no_folder, form
 from ..base.fixes import Fix
 from ..files.atomic import atomic_write
 from ..files.clip_file import CLIP_ENDINGS, FOREIGN, is_clip_file
+from ..files.file_names import identify_file
 
 CACHE_FOLDER = ".beyond_mocap"
 CLASSIFIER_FILE = "learned_words.npz"
@@ -61,13 +62,13 @@ def find_recordings(folder: str | Path, endings: tuple[str, ...] = (*CLIP_ENDING
         raise InputError(folder, describe_no_folder(folder), "a folder with BVH files",
                          "choose the folder of your library", fixes=(Fix("relink_library"),))
     found: dict[str, Path] = {}  # name below the folder -> file
-    seen: set[tuple[int, int]] = set()
+    seen: set[tuple[int, int] | str] = set()
     for parent, folders, files in os.walk(folder, followlinks=True):
-        status = os.stat(parent)
-        if (status.st_dev, status.st_ino) in seen:
+        identity = identify_file(parent)
+        if identity in seen:
             folders.clear()
             continue
-        seen.add((status.st_dev, status.st_ino))
+        seen.add(identity)
         folders[:] = sorted(name for name in folders if name != CACHE_FOLDER)
         place = Path(parent)
         below = "".join(f"{part}/" for part in place.relative_to(folder).parts)

@@ -103,7 +103,7 @@ class WrittenKeys:
         self._places = _read_places(collect_curves(action, slot))
         self._frames = next(iter(self._places.values()))[::2].copy()
         self._edited = {key: np.zeros(len(self._frames), bool) for key in self._places}
-        self._is_part_unwritten = False
+        self._unwritten: slice | None = None  # columns that `replace` has left out
         self.is_current = True
 
     def can_replace(self, target: bpy.types.Object, first: float, channels: dict[str, tuple[str, np.ndarray]]) -> bool:
@@ -168,17 +168,31 @@ class WrittenKeys:
         for edited in self._edited.values():
             edited[column:] = False
         end = len(self._frames) if shown is None else self._find_column(shown) + 2
-        self._is_part_unwritten = end - column <= _FEW_KEYS
-        if self._is_part_unwritten:
+        if end - column <= _FEW_KEYS:
             self._write_few(target, slice(column, end))
+            self._unwritten = slice(end, None)
         else:
             self._write_all(target)
+            self._unwritten = None
 
-    def write_others(self, target: bpy.types.Object) -> None:
-        """Write the keys that the last `replace` has left out."""
-        if self._is_part_unwritten:
-            self._write_all(target)
-            self._is_part_unwritten = False
+    def write_others(self, target: bpy.types.Object) -> bool:
+        """Write the keys that the last `replace` has left out; what the user has edited before them meanwhile stays.
+
+        Returns:
+            Whether all are written: False, from then on, where keys have been added, removed or moved meanwhile, or
+            another action is played.
+        """
+        if self._unwritten is None:
+            return True
+        new = {key: places.reshape(-1, 2)[self._unwritten, 1].copy() for key, places in self._places.items()}
+        if not self.note_edits(target):
+            return False
+        for key, values in new.items():  # the keys there are still the old ones, which is no edit
+            self._places[key].reshape(-1, 2)[self._unwritten, 1] = values
+            self._edited[key][self._unwritten] = False
+        self._write_all(target)
+        self._unwritten = None
+        return True
 
     def _write_all(self, target: bpy.types.Object) -> None:
         """Write all keys: the time grows with their number, 75 ns each."""

@@ -239,19 +239,20 @@ def _is_label_file(name: str) -> bool:
 def _iter_files(folder: str):
     """Iterate over the paths of all recordings and label files below a folder; links are followed, each folder once."""
     from ...beyond_mocap.files.clip_file import CLIP_ENDINGS, FOREIGN, is_clip_file
+    from ...beyond_mocap.files.file_names import identify_file
     from ...beyond_mocap.library.recorded_ball.ball_table import ENDING
     from ...beyond_mocap.library.scan import CACHE_FOLDER, TABLE_NAME
 
     wanted, seen = (*CLIP_ENDINGS, ".txt", TABLE_NAME, ENDING, *FOREIGN), set()
     for here, folders, files in os.walk(folder, followlinks=True):
         try:
-            status = os.stat(here)
+            identity = identify_file(here)
         except OSError:
             continue
-        if (status.st_dev, status.st_ino) in seen:
+        if identity in seen:
             folders.clear()
             continue
-        seen.add((status.st_dev, status.st_ino))
+        seen.add(identity)
         folders[:] = [name for name in folders if name != CACHE_FOLDER]
         paths = (os.path.join(here, name) for name in files if name.lower().endswith(wanted))
         yield from (path for path in paths if is_clip_file(Path(path)))

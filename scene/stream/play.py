@@ -55,8 +55,18 @@ def apply_rally(scene: bpy.types.Scene, new_rally: NewRally) -> None:
     rally_status.write_status(get_current_rally())
 
 
-def stop_rally() -> None:
-    """Stop answering; what was played stays."""
+def stop_rally(is_undone: bool = False) -> None:
+    """Stop answering; what was played stays, and a pass that is partly written is finished, unless the scene has been
+    undone.
+    """
+    keys, uid = _session.get("keys"), _session.get("scene")
+    _clear_session()
+    for scene in () if is_undone or keys is None else bpy.data.scenes:
+        if scene.session_uid == uid:
+            keys.finish_pass(scene)
+
+
+def _clear_session() -> None:
     background.cancel_jobs("live")
     if _session.get("watchers"):
         _session["watchers"].cancel()
@@ -144,7 +154,8 @@ def update_rally(scene: bpy.types.Scene) -> None:
         _end_rally("The scene has been updated or cleared: press Play Live to continue")
         return
     _session["drawn"] = compute_rally_seconds(scene)
-    _finish_pass(scene)
+    if not _finish_pass(scene):
+        _write_rest(scene)
     _update_target(scene)
     _collect_answer()
     _show_watchers(scene)
@@ -289,11 +300,13 @@ def _apply_pass(scene, piece: LivePass, hit: HitMotion | None = None, seconds: f
     rally_status.add_note(_session["keys"])
 
 
-def _finish_pass(scene) -> None:
-    """Write the keys of the last pass that are not shown yet, and let the other players watch it."""
-    _session["keys"].finish_pass(scene)
+def _finish_pass(scene) -> bool:
+    """Write the keys of the last pass that are not shown yet, and let the other players watch it; False where its keys
+    have been changed by others, which takes a `_write_rest`.
+    """
     if _session["watchers"] is not None:
         _session["watchers"].start()
+    return _session["keys"].finish_pass(scene)
 
 
 def _show_watchers(scene) -> None:
@@ -373,11 +386,11 @@ def _update_target(scene) -> None:
             scene.beyond_mocap_stream.target = row.name
 
 
-def _end_rally(reason: str) -> None:
+def _end_rally(reason: str, is_undone: bool = False) -> None:
     """End the rally with a message."""
-    stop_rally()
     status_texts = bpy.context.window_manager.beyond_mocap_streaming
     status_texts.playing, status_texts.played = False, reason
+    stop_rally(is_undone)
 
 
 def _mark_edits(_scene, depsgraph) -> None:
@@ -389,7 +402,7 @@ def _mark_edits(_scene, depsgraph) -> None:
 def _after_undo() -> None:
     """End the rally after an undo, which changes the scene that the rally knows."""
     if get_current_rally() is not None:
-        _end_rally("Undo has ended Play Live: press it to start again")
+        _end_rally("Undo has ended Play Live: press it to start again", is_undone=True)
 
 
 WATCHER = Watcher(name="Play Live", changed=_mark_edits, restored=_after_undo, saving=write_rest, closing=stop_rally,

@@ -49,14 +49,15 @@ class RallyKeys:
         for keys in (*self._players.values(), *([self._ball] if self._ball else ())):
             keys.is_current = False
 
-    def finish_pass(self, scene: bpy.types.Scene) -> None:
-        """Write the keys of the last pass that `replace_pass` has left out."""
-        rows = scene.beyond_mocap_passes.players
-        for name, keys in self._players.items():
-            if name in rows and rows[name].body is not None:
-                keys.write_others(rows[name].body)
-        if self._ball is not None and scene.beyond_mocap_passes.rally is not None:
-            self._ball.write_others(scene.beyond_mocap_passes.rally)
+    def finish_pass(self, scene: bpy.types.Scene) -> bool:
+        """Write the keys of the last pass that `replace_pass` has left out.
+
+        Returns:
+            Whether that was possible; otherwise `write_all` is needed, since the keys have been changed by others.
+        """
+        rows, ball = scene.beyond_mocap_passes.players, scene.beyond_mocap_passes.rally
+        pairs = [(keys, rows[name].body) for name, keys in self._players.items() if name in rows]
+        return all([keys.write_others(target) for keys, target in (*pairs, (self._ball, ball)) if keys and target])
 
     def note_edits(self, scene: bpy.types.Scene) -> None:
         """Compare the keys of one player if they are marked: it takes some milliseconds, for which a strike would have

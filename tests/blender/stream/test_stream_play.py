@@ -238,6 +238,36 @@ def set_key(room, body, frame, value):
     return read
 
 
+@pytest.mark.parametrize("event", ["error", "undo", "edit", "removal"])
+def test_a_pass_that_is_partly_written_is_finished(playing, room, core, monkeypatch, event):
+    """Also where the rally ends, and around what the user edits meanwhile; not after an undo."""
+    play, body = room("stream.play"), playing.beyond_mocap_passes.players["Ann"].body
+    monkeypatch.setattr(play, "is_playing", lambda: True)
+    plan_ahead(play, core, playing)
+    playing.frame_set(53)
+    play.store_strike(kick(core), time.monotonic())
+    play.answer_in_playback(playing)
+    partly = read_keys(room, playing, "Ann")[1]
+    assert play.get_current_rally().passes == 1
+    if event == "error":
+        play._end_rally("an error")
+    elif event == "undo":
+        play.WATCHER.restored()
+    elif event == "edit":
+        early = set_key(room, body, 20, 7.0)
+        play.update_rally(playing)
+        assert early() == 7.0
+    else:
+        action = room("core.channels").find_playing_action(body)
+        points = next(iter(room("core.channels").collect_curves(*action).values())).keyframe_points
+        points.remove(points[10])
+        play.update_rally(playing)
+        assert "Keys were added, removed or moved, and have been written again: Ann" in told().played
+    whole = read_keys(room, playing, "Ann")[1]
+    assert (np.abs(whole[80:1500] - partly[80:1500]).max() > 0.1) == (event != "undo")
+    assert (play.get_current_rally() is None) == (event in ("error", "undo"))
+
+
 def test_values_that_the_user_has_edited_stay(playing, room, core):
     """Before the pass, when it is written and when all is written again; the panel names what the pass replaces."""
     play, body = room("stream.play"), playing.beyond_mocap_passes.players["Ann"].body

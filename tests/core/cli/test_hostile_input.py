@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from beyond_mocap.base import content, user_folders
+from beyond_mocap.base.errors import InputError
 from beyond_mocap.cli.main import build_parser, main
 from beyond_mocap.cli.outputs import check_outputs
 from beyond_mocap.files.bvh import bvh
@@ -177,6 +178,26 @@ def test_the_library_is_listed_once_for_all_outputs_that_exist(tmp_path, monkeyp
     check_outputs(*outputs, None, library=SAMPLE_LIBRARY)
     check_outputs(tmp_path / "new.bvh", library=SAMPLE_LIBRARY)
     assert folders == [SAMPLE_LIBRARY]
+
+
+def test_where_files_have_no_numbers_outputs_and_folders_are_told_apart_by_their_paths(tmp_path, monkeypatch):
+    for folder in ("one", "two"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "walk.bvh").write_bytes(WALK.read_bytes())
+    (tmp_path / "out.bvh").touch()
+    (tmp_path / "link.bvh").symlink_to(tmp_path / "two" / "walk.bvh")
+    stat = os.stat
+
+    def stat_without_number(path, **named):
+        fields = list(stat(path, **named))
+        fields[1] = 0
+        return os.stat_result(fields)
+
+    monkeypatch.setattr(os, "stat", stat_without_number)
+    assert {path.parent.name for path in scan.find_recordings(tmp_path)} >= {"one", "two"}
+    check_outputs(tmp_path / "out.bvh", library=tmp_path / "one")
+    with pytest.raises(InputError, match="is a file of the library"):
+        check_outputs(tmp_path / "link.bvh", library=tmp_path / "two")
 
 
 def test_no_output_takes_the_place_of_metadata_that_is_found_beside_tracking_data(run_line, tmp_path):
