@@ -203,6 +203,9 @@ def find_falls(height: np.ndarray, fps: float, least: float) -> np.ndarray:
 def measure_falls(frames, fps: float) -> np.ndarray:
     """Measure the strangeness (N,) float32 of hips that fall: that of the whole fall, 0 elsewhere.
 
+    To leave out the rise before it too makes takes no better: on two slices of a match the pelvis drops 0.75 and 0.51
+    times a minute instead of 0.75 and 0.45.
+
     Args:
         frames: the library's frames, N of them.
         fps: of the frames.
