@@ -52,17 +52,17 @@ def find_cut_receptions(clips: Sequence, frames: Frames, feet_in_contact: np.nda
 
 def _find_gives(frames: Frames, dribbles: np.ndarray, is_in_contact: np.ndarray, side: int) -> list[tuple[float, int]]:
     """Find the frames in which one foot begins to give, with its largest speed in m/s around them."""
-    from scipy.signal import find_peaks
-
     toe = frames.feet[:, 2 * side : 2 * side + 2]
     speed = np.linalg.norm(np.gradient(toe, axis=0), axis=1) * FPS
     around, back, free = (int(np.ceil(seconds * FPS)) for seconds in (_AROUND_SECONDS, _GIVE_SECONDS, _FREE_SECONDS))
+    ahead, width = toe[:, 0], max(around, back)
+    is_peak = (ahead[1:-1] > ahead[:-2]) & (ahead[1:-1] > ahead[2:]) & (ahead[1:-1] >= _AHEAD)
+    peaks = np.flatnonzero(is_peak) + 1
+    peaks = peaks[(peaks >= width) & (peaks + width < len(frames))]
+    dribbled = np.concatenate([[0], np.cumsum(dribbles)])  # most peaks are steps of walks
+    peaks = peaks[dribbled[peaks + width + 1] - dribbled[peaks - width] == 2 * width + 1]
     found = []
-    for frame in find_peaks(toe[:, 0], height=_AHEAD)[0]:
-        first, end = frame - max(around, back), frame + max(around, back) + 1
-        inside = first >= 0 and end <= len(frames) and frames.clip[first] == frames.clip[end - 1]
-        if not inside or not dribbles[first:end].all():
-            continue
+    for frame in peaks[frames.clip[peaks - width] == frames.clip[peaks + width]]:
         fastest = float(speed[frame - around : frame + around + 1].max())
         gives = toe[frame, 0] - toe[frame : frame + back + 1, 0].min() >= _GIVE
         if gives and fastest <= _FASTEST and not is_in_contact[frame : frame + free + 1].any():

@@ -10,6 +10,8 @@ of 55 s does.
 
 from __future__ import annotations
 
+from itertools import accumulate
+
 import numpy as np
 
 from ..motion.track import Track, smooth_positions
@@ -33,11 +35,11 @@ def compute_exertion(speed: np.ndarray, fps: float, before: float = 0.0) -> np.n
     Returns:
         (T,) m, 0 or more.
     """
-    from scipy.signal import lfilter
-
     excess = np.maximum(speed - HIGH_SPEED, 0.0)
     gained = np.concatenate([[before], 0.5 * (excess[1:] + excess[:-1]) / fps])[: len(speed)]
-    return lfilter([1.0], [1.0, -np.exp(-1.0 / (RECOVERY_SECONDS * fps))], gained)
+    decay = float(np.exp(-1.0 / (RECOVERY_SECONDS * fps)))
+    # scipy.signal has this filter, but loading it takes a quarter of a take's time
+    return np.array(list(accumulate(gained.tolist(), lambda before, now: now + decay * before)))
 
 
 def measure_exertion(track: Track, time: float, before: float = 0.0) -> float:
