@@ -18,7 +18,7 @@ import shutil
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +35,7 @@ from ..files.motion_file import MotionWriter, divide_into_motions, map_array
 from ..motion.skeleton import Skeleton
 from .clip import Clip, RepairFigures
 from .coverage import Coverage
-from .features import Frames
+from .features import Frames, list_frame_arrays
 from .scan import CACHE_FOLDER, read_stamp
 
 # raised whenever what is computed or stored changes, so that old caches are not used
@@ -45,7 +45,6 @@ MOTIONS = "motions.npy"
 _DIGESTS, _COVERAGE = "digests.json", "coverage"
 _SETTLED = 2_000_000_000  # ns since a file's last change from which on its time tells the next one
 _TOKEN_BYTES = 6  # of the part of a folder's name that makes it unique
-_FRAME_ARRAYS = tuple(field.name for field in fields(Frames) if field.name != "vocabulary")
 
 
 class SourceDigests:
@@ -238,7 +237,7 @@ def load_coverage(place: Path, key: str) -> Coverage | None:
 
 def _list_arrays(library) -> dict[str, np.ndarray]:
     """List the arrays of a library, except its motions, by name."""
-    arrays = {f"frames.{part}": getattr(library.frames, part) for part in _FRAME_ARRAYS}
+    arrays = {f"frames.{name}": values for name, values in list_frame_arrays(library.frames).items()}
     arrays["contacts"] = np.concatenate([clip.heel_toe_contacts for clip in library.clips])
     balls = [clip.ball for clip in library.clips if clip.ball is not None]
     if balls:
@@ -361,7 +360,8 @@ def _restore_fields(header: dict, arrays: dict) -> dict:
                           ball=arrays["balls"][ball_start : ball_start + known] if known else None))
         start, ball_start = start + count, ball_start + known
     frames = Frames(
-        vocabulary=tuple(header["vocabulary"]), **{name: arrays[f"frames.{name}"] for name in _FRAME_ARRAYS}
+        vocabulary=tuple(header["vocabulary"]),
+        **{name.removeprefix("frames."): values for name, values in arrays.items() if name.startswith("frames.")},
     )
     return {
         "skeleton": skeleton, "clips": tuple(clips), "frames": frames, "fps": header["fps"],
@@ -380,9 +380,9 @@ def write_synthetic_clips(place: Path, clips: Iterable[Clip], missing_only: bool
         missing_only: write only files that do not exist.
     """
     try:
-        for clip in clips:
+        for clip in (clip for clip in clips if not clip.mirrored):
             file = place / Path(clip.source_at(len(clip.motion) - 1)).relative_to(CACHE_FOLDER)
-            if not clip.mirrored and not (missing_only and file.exists()):
+            if not (missing_only and os.path.exists(file)):
                 file.parent.mkdir(parents=True, exist_ok=True)
                 bvh.write_bvh(file, clip.motion)
     except (OSError, InputError):

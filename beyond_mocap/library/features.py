@@ -10,7 +10,7 @@ second later. Faustino drops each motion's first two frames, which lack derivati
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -249,7 +249,7 @@ def build_label_matrix(clip, source: np.ndarray, vocabulary: tuple[str, ...]) ->
 
 def join_frames(a: Frames, b: Frames) -> Frames:
     """Join the frames of `a` and `b`, which has the components of `a`; clip numbers of `b` continue those of `a`."""
-    vocabulary = tuple(sorted({*a.vocabulary, *b.vocabulary}))
+    vocabulary = join_vocabularies(a, b)
     words = np.zeros((len(a) + len(b), len(vocabulary)), bool)
     for frames, rows in ((a, slice(0, len(a))), (b, slice(len(a), None))):
         words[rows, [vocabulary.index(word) for word in frames.vocabulary]] = frames.words
@@ -259,6 +259,16 @@ def join_frames(a: Frames, b: Frames) -> Frames:
     }
     clip, first = np.append(a.clip, b.clip + len(a.first)), np.append(a.first, b.first + len(a))
     return Frames(clip=clip, first=first, mean=a.mean, basis=a.basis, words=words, vocabulary=vocabulary, **parts)
+
+
+def join_vocabularies(a: Frames, b: Frames) -> tuple[str, ...]:
+    """Join the labels of two libraries' frames, in the order of the columns of `join_frames`."""
+    return tuple(sorted({*a.vocabulary, *b.vocabulary}))
+
+
+def list_frame_arrays(frames: Frames) -> dict[str, np.ndarray]:
+    """List the arrays of frames by name: all but their vocabulary."""
+    return {field.name: getattr(frames, field.name) for field in fields(frames) if field.name != "vocabulary"}
 
 
 _COLUMNS = ("clip", "source", "root", "heading", "path", "velocity", "feet", "jerk", "lean", "features", "posture",

@@ -27,7 +27,7 @@ from .cache import write_synthetic_clips
 from .clip import Clip
 from .clusters import BLOCK_LENGTHS, Clusters, cluster_blocks
 from .coverage import BACK_SPEEDS, TURNS, Coverage, measure_coverage
-from .features import FPS, Frames, build_frames, join_frames
+from .features import FPS, Frames, build_frames, join_frames, join_vocabularies, list_frame_arrays
 from .keys import KICK_STEP, Key, collect_keys, measure_kick_speed
 from .loops.run_loops import MIN_SPEED
 from .loops.standing_loops import MIN_STAND_SECONDS
@@ -220,7 +220,7 @@ class Library:
         These add the speeds between and above the recordings, and kicks on the run. They are generated on first use and
         cached. InputError where no recording shows locomotion.
         """
-        measure_gaits(self)  # a library without locomotion raises InputError
+        self.gaits  # noqa: B018  # a library without locomotion raises InputError
         cached = cache.load_library(*self.cache_location, "made") if self.cache_location else None
         synthetic = Library(folder="", **cached) if cached else None
         if synthetic is None:
@@ -232,8 +232,9 @@ class Library:
             write_synthetic_clips(self.cache_location[0], synthetic.clips, missing_only=True)
         if not synthetic.clips:
             return self
-        joined = self._join(synthetic)
-        if self.index_place is not None and self.index_place[-1] == RECORDED_INDEX:
+        is_whole = self.index_place is not None and self.index_place[-1] == RECORDED_INDEX
+        joined = self._join(synthetic, is_stored=is_whole)
+        if is_whole:
             vars(joined)["index_place"] = (*self.cache_location, f"made-{RECORDED_INDEX}")
         return joined
 
@@ -256,9 +257,15 @@ class Library:
         vars(joined).update(known, _base=weakref.ref(self))  # where cached properties keep their values
         return joined
 
-    def _join(self, other: "Library") -> "Library":
-        """Return the library followed by the clips of another one."""
-        frames = join_frames(self.frames, other.frames)
+    def _join(self, other: "Library", is_stored: bool = False) -> "Library":
+        """Return the library followed by the clips of another one; is_stored: with its frames in the cache, from where
+        only those that are used are read.
+        """
+        if is_stored:
+            arrays = self._find_stored("made-frames", lambda: list_frame_arrays(join_frames(self.frames, other.frames)))
+            frames = Frames(vocabulary=join_vocabularies(self.frames, other.frames), **arrays)
+        else:
+            frames = join_frames(self.frames, other.frames)
         return replace(self, clips=(*self.clips, *other.clips), frames=frames)
 
     def needs_synthetic_clips(self, speed: np.ndarray, offset: np.ndarray, heading: np.ndarray,

@@ -190,8 +190,9 @@ class Annotations:
 
     def list_sources(self, clips: list[Path]) -> list[Path]:
         """List every file that was or would be read for annotations; the cache depends on them."""
-        texts = [clip.with_suffix(".txt") for clip in clips]
-        return [path for path in texts if path.is_file()] + [place / TABLE_NAME for place in sorted(self.tables)]
+        texts = [os.path.splitext(clip)[0] + ".txt" for clip in clips]
+        return [*(Path(text) for text in texts if os.path.isfile(text)),
+                *(place / TABLE_NAME for place in sorted(self.tables))]
 
 
 def describe_misspelled_labels(rows: Mapping[str, Sequence[annotation.ClipAnnotation]]) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 ENDING = ".ball.csv"
@@ -17,5 +18,8 @@ def find_ball_table(path: Path, file: Path) -> Path | None:
     Returns:
         The table beside the recording, else that of its conversion, else None.
     """
-    tables = (path.with_suffix(ENDING), file.with_suffix(ENDING))
-    return next((table for table in tables if table.is_file()), None)
+    for recording in (path,) if file == path else (path, file):
+        table = os.path.splitext(recording)[0] + ENDING  # a path object for each of thousands takes longer
+        if os.path.isfile(table):
+            return Path(table)
+    return None

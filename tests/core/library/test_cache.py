@@ -18,6 +18,7 @@ from beyond_mocap.files import motion_file
 from beyond_mocap.library import build, cache, scan, synthetic_clips
 from beyond_mocap.library import library as library_module
 from beyond_mocap.library.build import build_library
+from beyond_mocap.library.features import list_frame_arrays
 from beyond_mocap.library.library import Library
 from beyond_mocap.library.scan import CACHE_FOLDER
 
@@ -49,8 +50,7 @@ def built(folder, **options):
 def arrays_of(library: Library) -> dict[str, np.ndarray]:
     """Every array of a library by name."""
     found = {"offsets": library.skeleton.offsets, "end_offsets": library.skeleton.end_offsets}
-    for name in cache._FRAME_ARRAYS:
-        found[f"frames.{name}"] = getattr(library.frames, name)
+    found |= {f"frames.{name}": values for name, values in list_frame_arrays(library.frames).items()}
     for number, clip in enumerate(library.clips):
         found[f"{number}.root"], found[f"{number}.rotations"] = clip.motion.root_positions, clip.motion.rotations
         found[f"{number}.standing"] = clip.heel_toe_contacts

@@ -14,6 +14,7 @@ from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.clip import BLEND_PREFIX, KICK_PREFIX, SYNTHETIC_FOLDER
 from beyond_mocap.library.coverage import MAX_SPEED, find_speed_gaps
+from beyond_mocap.library.features import list_frame_arrays
 from beyond_mocap.library.keys import Key, select_substitutes
 from beyond_mocap.library.missing_actions import describe_action
 from beyond_mocap.library.synthetic_clips import complete_gaits
@@ -99,7 +100,11 @@ def test_kept_beside_the_cache_and_read_back_the_same(library, more):
     place = library.cache_location[0]
     assert (place / "made.json").is_file() and list((place / "made-gait").glob("*.bvh"))
     again = build_library(library.folder, cache_dir=place).with_synthetic_clips
-    assert np.array_equal(again.frames.features, more.frames.features)
+    here = list_frame_arrays(more.frames)
+    for name, values in list_frame_arrays(again.frames).items():
+        assert np.array_equal(values, here[name]) and values.dtype == here[name].dtype, name
+        assert isinstance(values, np.memmap) or isinstance(values.base, np.memmap), "read where they are used"
+    assert again.frames.vocabulary == more.frames.vocabulary
     assert all(np.array_equal(a.heel_toe_contacts, b.heel_toe_contacts) for a, b in zip(again.clips, more.clips))
 
 
