@@ -34,7 +34,7 @@ def identify_file(path: str | Path) -> tuple[int, int] | str:
         OSError: if there is none.
     """
     status = os.stat(path)
-    return (status.st_dev, status.st_ino) if status.st_ino else os.path.realpath(path)
+    return (status.st_dev, status.st_ino) if status.st_ino else os.path.normcase(os.path.realpath(path))
 
 
 def build_file_names(ids: Iterable[str]) -> dict[str, str]:

@@ -159,7 +159,8 @@ def create_arrays_folder(place: Path, name: str = "library") -> Iterator[Path]:
 
 
 def save_library(place: Path, key: str, library, *, arrays: Path, name: str = "library") -> None:
-    """Save `library` in `place`, and remove what was saved there long before.
+    """Save `library` in `place`, and remove what was saved there long before, and what was computed from the one that
+    it replaces.
 
     Args:
         place: the cache's folder.
@@ -178,6 +179,18 @@ def save_library(place: Path, key: str, library, *, arrays: Path, name: str = "l
     for part, values in _list_arrays(library).items():
         np.save(arrays / f"{part}.npy", values, allow_pickle=False)
     _publish(place, name, arrays, _build_header(key, library))
+    _remove_derived(place, name)
+
+
+def _remove_derived(place: Path, name: str) -> None:
+    """Remove the headers of what was computed from the library of this name; it may have the same key, if it was built
+    again because the cache seemed wrong.
+    """
+    derived = place.glob("*.json" if name == "library" else f"{name}-*.json")
+    for header in [header for header in derived if header.stem not in ("library", _COVERAGE)]:
+        if _read_header(place, header.stem):  # other files have no digest
+            with suppress(OSError):
+                header.unlink()
 
 
 def _publish(place: Path, name: str, arrays: Path, header: dict) -> None:

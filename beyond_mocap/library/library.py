@@ -157,7 +157,7 @@ class Library:
         return {name: np.asarray(getattr(stance, name)) for name in _STANCE_NUMBERS}
 
     def _find_stored(self, name: str, compute: Callable[[], dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
-        """Find arrays of the recordings in the cache, or compute and store them."""
+        """Find arrays that are computed from the recordings in the cache, or compute and store them."""
         place = self.index_place and (*self.index_place[:2], name)
         stored = cache.load_arrays(*place) if place else None
         if stored is None:
@@ -259,7 +259,7 @@ class Library:
 
     def _join(self, other: "Library", is_stored: bool = False) -> "Library":
         """Return the library followed by the clips of another one; is_stored: with its frames in the cache, from where
-        only those that are used are read.
+        later on only those that are used are read.
         """
         if is_stored:
             arrays = self._find_stored("made-frames", lambda: list_frame_arrays(join_frames(self.frames, other.frames)))

@@ -55,9 +55,7 @@ def _find_gives(frames: Frames, dribbles: np.ndarray, is_in_contact: np.ndarray,
     toe = frames.feet[:, 2 * side : 2 * side + 2]
     speed = np.linalg.norm(np.gradient(toe, axis=0), axis=1) * FPS
     around, back, free = (int(np.ceil(seconds * FPS)) for seconds in (_AROUND_SECONDS, _GIVE_SECONDS, _FREE_SECONDS))
-    ahead, width = toe[:, 0], max(around, back)
-    is_peak = (ahead[1:-1] > ahead[:-2]) & (ahead[1:-1] > ahead[2:]) & (ahead[1:-1] >= _AHEAD)
-    peaks = np.flatnonzero(is_peak) + 1
+    peaks, width = _find_peaks(toe[:, 0], _AHEAD), max(around, back)
     peaks = peaks[(peaks >= width) & (peaks + width < len(frames))]
     dribbled = np.concatenate([[0], np.cumsum(dribbles)])  # most peaks are steps of walks
     peaks = peaks[dribbled[peaks + width + 1] - dribbled[peaks - width] == 2 * width + 1]
@@ -68,6 +66,16 @@ def _find_gives(frames: Frames, dribbles: np.ndarray, is_in_contact: np.ndarray,
         if gives and fastest <= _FASTEST and not is_in_contact[frame : frame + free + 1].any():
             found.append((fastest, int(frame)))
     return found
+
+
+def _find_peaks(values: np.ndarray, least: float) -> np.ndarray:
+    """Find the peaks of values (T,) from `least` on, the middle of flat ones, as scipy.signal.find_peaks, which takes
+    half a second to load.
+    """
+    starts = np.flatnonzero(np.append(True, np.diff(values) != 0.0)[: len(values)])
+    held, ends = values[starts], np.append(starts[1:], len(values)) - 1
+    is_peak = (held[1:-1] > held[:-2]) & (held[1:-1] > held[2:]) & (held[1:-1] >= least)
+    return ((starts + ends)[1:-1] // 2)[is_peak]
 
 
 def _build_key(clips: Sequence, frames: Frames, frame: int, side: str) -> Key:

@@ -39,7 +39,7 @@ def compute_exertion(speed: np.ndarray, fps: float, before: float = 0.0) -> np.n
     gained = np.concatenate([[before], 0.5 * (excess[1:] + excess[:-1]) / fps])[: len(speed)]
     decay = float(np.exp(-1.0 / (RECOVERY_SECONDS * fps)))
     # scipy.signal has this filter, but loading it takes a quarter of a take's time
-    return np.array(list(accumulate(gained.tolist(), lambda before, now: now + decay * before)))
+    return np.array(list(accumulate(gained.tolist(), lambda total, now: now + decay * total)))
 
 
 def measure_exertion(track: Track, time: float, before: float = 0.0) -> float:

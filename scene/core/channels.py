@@ -170,7 +170,7 @@ class WrittenKeys:
         end = len(self._frames) if shown is None else self._find_column(shown) + 2
         if end - column <= _FEW_KEYS:
             self._write_few(target, slice(column, end))
-            self._unwritten = slice(end, None)
+            self._unwritten = slice(max(column, end), None)  # a strike may be later than what is drawn
         else:
             self._write_all(target)
             self._unwritten = None

@@ -56,8 +56,8 @@ def apply_rally(scene: bpy.types.Scene, new_rally: NewRally) -> None:
 
 
 def stop_rally(is_undone: bool = False) -> None:
-    """Stop answering; what was played stays, and a pass that is partly written is finished, unless the scene has been
-    undone.
+    """Stop answering; what was played stays, and a pass that is partly written is finished where its keys are still
+    there, unless the scene has been undone.
     """
     keys, uid = _session.get("keys"), _session.get("scene")
     _clear_session()

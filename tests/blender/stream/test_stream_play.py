@@ -238,6 +238,25 @@ def set_key(room, body, frame, value):
     return read
 
 
+def test_edits_before_a_pass_that_begins_later_stay(playing, room, core, monkeypatch):
+    """The strike is later than the frame that is drawn, and keys between them are edited before it is answered, and
+    while the pass is partly written.
+    """
+    play, body = room("stream.play"), playing.beyond_mocap_passes.players["Ann"].body
+    clock = SimpleNamespace(moment=0.0)
+    monkeypatch.setattr(play, "is_playing", lambda: True)
+    monkeypatch.setattr(play, "time", SimpleNamespace(monotonic=lambda: clock.moment))
+    plan_ahead(play, core, playing)
+    early = set_key(room, body, 50, 7.0)
+    play._session["keys"].mark_edits()
+    play_and_strike(play, playing, core, clock, {99: 16, 100: 40}, in_playback=False)
+    late = set_key(room, body, 52, 8.0)
+    play.answer_in_playback(playing)
+    assert play.get_current_rally().passes == 1 and (early(), late()) == (7.0, 8.0)
+    play.write_rest()
+    assert (early(), late()) == (7.0, 8.0)
+
+
 @pytest.mark.parametrize("event", ["error", "undo", "edit", "removal"])
 def test_a_pass_that_is_partly_written_is_finished(playing, room, core, monkeypatch, event):
     """Also where the rally ends, and around what the user edits meanwhile; not after an undo."""

@@ -11,6 +11,7 @@ import pytest
 
 from beyond_mocap.annotation import KeyMoment, Timeline
 from beyond_mocap.files.bvh import bvh
+from beyond_mocap.library import features
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.clip import BLEND_PREFIX, KICK_PREFIX, SYNTHETIC_FOLDER
 from beyond_mocap.library.coverage import MAX_SPEED, find_speed_gaps
@@ -106,6 +107,18 @@ def test_kept_beside_the_cache_and_read_back_the_same(library, more):
         assert isinstance(values, np.memmap) or isinstance(values.base, np.memmap), "read where they are used"
     assert again.frames.vocabulary == more.frames.vocabulary
     assert all(np.array_equal(a.heel_toe_contacts, b.heel_toe_contacts) for a, b in zip(again.clips, more.clips))
+
+
+def test_what_was_computed_from_a_library_goes_when_it_is_built_from_scratch(library, more, tmp_path, monkeypatch):
+    """Under the same key: the cache seemed wrong."""
+    place = shutil.copytree(library.cache_location[0], tmp_path / "cache")
+    (place / "notes.json").write_text("[1]", "utf-8")
+    jerk = features.compute_max_jerk
+    monkeypatch.setattr(features, "compute_max_jerk", lambda *order: 2.0 * jerk(*order))
+    again = build_library(library.folder, cache_dir=place, rebuild=True)
+    assert np.array_equal(again.frames.jerk, 2.0 * library.frames.jerk)
+    assert np.array_equal(again.with_synthetic_clips.frames.jerk[: len(again.frames)], again.frames.jerk)
+    assert (place / "notes.json").is_file()
 
 
 def test_made_files_that_were_tidied_away_are_written_again(library, more, tmp_path):

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import find_peaks
 
 from beyond_mocap.annotation import KeyMoment, Timeline
 from beyond_mocap.files.bvh import bvh
+from beyond_mocap.library import receptions
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.missing_actions import ActionMoment, find_missing_actions
 from beyond_mocap.motion.track import Track
@@ -75,3 +77,9 @@ def test_a_reception_may_be_the_last_frame_of_the_last_clip(tmp_path, clip_file)
     for speed, is_missing in ((0.0, False), (3.0, True)):  # it suits who stands
         asked = ActionMoment(labels=frozenset({"receive", "foot"}), speed=speed)
         assert bool(find_missing_actions(library, [asked])) == is_missing
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 50, 2000])
+def test_peaks_are_those_of_scipy_also_flat_ones(count):
+    values = np.round(np.random.default_rng(count).normal(0.3, 0.03, count), 2)
+    assert np.array_equal(receptions._find_peaks(values, 0.28), find_peaks(values, height=0.28)[0])
