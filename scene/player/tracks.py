@@ -12,7 +12,6 @@ from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.files.joints.joint_readers import is_joint_file
 from ...beyond_mocap.files.tracking import tracking
 from ...beyond_mocap.files.tracking.feed import is_track_csv
-from ...beyond_mocap.match.known_bodies import read_joint_match
 from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, to_absolute_path
 from . import drawn_track
 
@@ -98,6 +97,8 @@ def _read_stamp(path: str) -> tuple[int, int]:
 def _read_match_cached(path: str, metadata: str | None, provider: str | None, _changed,
                        pitch: tuple[float, float] | None) -> tracking.Match:
     if not provider and is_joint_file(path):
+        from ...beyond_mocap.match.known_bodies import read_joint_match  # imports scipy, which is slow
+
         return read_joint_match(path, pitch)[0]
     return tracking.read_match(path, metadata, provider, pitch=pitch)
 

@@ -22,6 +22,8 @@ ENABLE = """
 import os, sys
 import bpy, addon_utils
 assert addon_utils.enable(sys.argv[1]) is not None
+for name in sys.argv[2:]:
+    __import__(f"{sys.argv[1]}.{name}")
 print(*sorted(sys.modules), flush=True)
 os._exit(0)
 """
@@ -157,6 +159,16 @@ def test_enabling_loads_nothing_heavy(extension):
     assert not HEAVY & {name.partition(".")[0] for name in loaded}
     assert not CORE & {name.removeprefix("beyond_mocap.") for name in own}
     assert len(own) <= MOST_MODULES
+
+
+def test_what_is_drawn_and_watched_from_the_first_moment_on_is_light(extension):
+    """Watchers load these modules as soon as a window is drawn: it would wait for half a second."""
+    first = ("scene.match.request", "scene.player.dots", "scene.player.tracks", "scene.result.freshness",
+             "scene.result.plans", "scene.timeline.strips")
+    loaded = subprocess.run([sys.executable, "-c", ENABLE, extension.__name__, *first], capture_output=True, text=True,
+                            timeout=60, check=True).stdout.split()
+    assert f"{extension.__name__}.scene.player.tracks" in loaded
+    assert not HEAVY & {name.partition(".")[0] for name in loaded}
 
 
 def test_no_property_is_text():
