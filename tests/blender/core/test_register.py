@@ -16,8 +16,8 @@ HEAVY = {"scipy", "sklearn", "kloppy", "c3d", "lxml", "joblib", "matplotlib"}
 CORE = {"annotation", "appearance.mesh", "ball.flight", "files.bvh.bvh", "library.library", "motion.humanoid",
         "motion.motion", "passes.pass_scene", "synthesis.plan", "synthesis.take"}  # fmt: skip
 MOST_MODULES = 158
-# A fresh process with this session's profile: enable, tell what is loaded, end without Blender's own ending (which may
-# hang).
+# A fresh process with this session's profile: enable, load the modules that are named, print all that are loaded, end
+# without Blender's own ending (which may hang).
 ENABLE = """
 import os, sys
 import bpy, addon_utils
@@ -151,10 +151,15 @@ def test_the_core_has_one_name():
         import beyond_mocap  # noqa: F401
 
 
-def test_enabling_loads_nothing_heavy(extension):
-    command = [sys.executable, "-P", "-c", ENABLE, extension.__name__]
+def list_loaded(extension, *modules):
+    """Modules that a fresh process has loaded after enabling, and then loading some of the extension's."""
+    command = [sys.executable, "-P", "-c", ENABLE, extension.__name__, *modules]
     ran = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
-    loaded = ran.stdout.splitlines()[-1].split()
+    return ran.stdout.splitlines()[-1].split()
+
+
+def test_enabling_loads_nothing_heavy(extension):
+    loaded = list_loaded(extension)
     own = [name.removeprefix(f"{extension.__name__}.") for name in loaded if name.startswith(extension.__name__)]
     assert not HEAVY & {name.partition(".")[0] for name in loaded}
     assert not CORE & {name.removeprefix("beyond_mocap.") for name in own}
@@ -165,8 +170,7 @@ def test_what_is_drawn_and_watched_from_the_first_moment_on_is_light(extension):
     """Watchers load these modules as soon as a window is drawn: it would wait for half a second."""
     first = ("scene.match.request", "scene.player.dots", "scene.player.tracks", "scene.result.freshness",
              "scene.result.plans", "scene.timeline.strips")
-    loaded = subprocess.run([sys.executable, "-c", ENABLE, extension.__name__, *first], capture_output=True, text=True,
-                            timeout=60, check=True).stdout.split()
+    loaded = list_loaded(extension, *first)
     assert f"{extension.__name__}.scene.player.tracks" in loaded
     assert not HEAVY & {name.partition(".")[0] for name in loaded}
 
