@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, is_dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -224,9 +225,12 @@ _PLAIN = frozenset((type(None), bool, int, float, str, bytes))
 
 
 @lru_cache
-def _list_fields(kind: type) -> tuple[tuple[str, bool], ...]:
-    """List the fields of a dataclass, and whether each is a part that was added later (`LATER_PART`)."""
-    return tuple((field.name, bool(field.metadata.get("is_part"))) for field in fields(kind))
+def _list_fields(kind: type) -> tuple[tuple[str, bytes, bool], ...]:
+    """List the fields of a dataclass: name, what the hash gets before the content, and whether it is a part that was
+    added later (`LATER_PART`).
+    """
+    return tuple((field.name, f"row 2\0str {field.name!r}\0".encode(), bool(field.metadata.get("is_part")))
+                 for field in fields(kind))
 
 
 def _add_parts_to_hash(hashed, value: object) -> None:
@@ -234,9 +238,7 @@ def _add_parts_to_hash(hashed, value: object) -> None:
     if isinstance(value, (tuple, list)):
         parts, kind = value, "row"
     elif is_dataclass(value) and not isinstance(value, type):
-        rows = ((name, getattr(value, name), is_later) for name, is_later in _list_fields(type(value)))
-        parts = [(name, content) for name, content, is_later in rows if not is_later or content]
-        kind = type(value).__name__
+        return _add_fields_to_hash(hashed, value)
     elif isinstance(value, Mapping):
         parts, kind = sorted(value.items()), "mapping"
     elif isinstance(value, (set, frozenset)):
@@ -246,3 +248,13 @@ def _add_parts_to_hash(hashed, value: object) -> None:
     hashed.update(f"{kind} {len(parts)}\0".encode())
     for part in parts:
         _add_to_hash(hashed, part)
+
+
+def _add_fields_to_hash(hashed, value: Any) -> None:
+    """Add a dataclass: rows of a field's name and its content."""
+    rows = [(begin, getattr(value, name), is_later) for name, begin, is_later in _list_fields(type(value))]
+    parts = [(begin, content) for begin, content, is_later in rows if not is_later or content]
+    hashed.update(f"{type(value).__name__} {len(parts)}\0".encode())
+    for begin, content in parts:
+        hashed.update(begin)
+        _add_to_hash(hashed, content)

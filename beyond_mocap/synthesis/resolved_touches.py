@@ -9,8 +9,10 @@ in dribbles step by step from foot to foot (`synthesis.construct.ball_touch.drib
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import replace
+from operator import attrgetter
 
 import numpy as np
 
@@ -148,9 +150,16 @@ def _build_touch(touch: SolvedTouch, player: str, plan: Plan) -> PlayerTouch:
     if not touch.player:
         place = [np.interp(touch.time, plan.track.times, plan.track.positions[:, axis]) for axis in (0, 1)]
         is_own = None if np.linalg.norm(touch.position[:2] - place) <= _WITHIN else False
-    heights = plan.track.ball_height_known[np.abs(plan.track.times - touch.time).argmin()]
+    heights = plan.track.ball_height_known[_find_nearest_sample(plan.track.times, touch.time)]
     part = touch.part if heights or touch.kind == THROW_IN else ""
     return PlayerTouch(touch.time, is_own, part, touch.kind)
+
+
+def _find_nearest_sample(times: np.ndarray, time: float) -> int:
+    """Find the sample nearest to a time, the earlier of two that are equally near."""
+    after = int(np.searchsorted(times, time))
+    near = np.arange(max(after - 1, 0), min(after + 1, len(times)))
+    return int(near[np.abs(times[near] - time).argmin()])
 
 
 def _match_touches(timeline: Timeline, touches: tuple[PlayerTouch, ...]) -> Timeline:
@@ -164,15 +173,14 @@ def _match_touches(timeline: Timeline, touches: tuple[PlayerTouch, ...]) -> Time
     best = np.full((len(keys) + 1, len(own_touches) + 1), np.inf)
     best[0], choices = 0.0, np.zeros((len(keys) + 1, len(own_touches) + 1), int)
     # best[row, column]: lowest cost of aligning the first `row` key moments with the first `column` touches;
-    # taken: 0 the key moment stays, 1 the touch is skipped, 2 they are matched
+    # choices: 0 the key moment stays, 1 the touch is skipped, 2 they are matched
     for row, key in enumerate(keys, 1):
-        for column in range(len(own_touches) + 1):
-            costs = [best[row - 1, column] + MAX_TOUCH_OFFSET]
-            if column:
-                costs += [best[row, column - 1], best[row - 1, column - 1]
-                          + _compute_mismatch(key, own_touches[column - 1])]
-            choices[row, column] = int(np.argmin(costs))
-            best[row, column] = min(costs)
+        stays, matches = best[row - 1] + MAX_TOUCH_OFFSET, np.full(len(own_touches) + 1, np.inf)
+        for number in _list_near_touches(key, own_touches):
+            matches[number + 1] = best[row - 1, number] + _compute_mismatch(key, own_touches[number])
+        best[row] = np.minimum.accumulate(np.minimum(stays, matches))  # skipped touches cost nothing
+        is_skipped = np.concatenate([[False], best[row, :-1] == best[row, 1:]])
+        choices[row] = np.where(best[row] == stays, 0, np.where(is_skipped, 1, 2))
     row, column, moved = len(keys), len(own_touches), keys[:]
     # trace back from the last cell: 0 moves up, 1 moves left, 2 moves both
     while row:
@@ -181,6 +189,13 @@ def _match_touches(timeline: Timeline, touches: tuple[PlayerTouch, ...]) -> Time
             moved[row - 1] = replace(keys[row - 1], solved=own_touches[column - 1].time)
         row, column = row - (choice != 1), column - (choice > 0)
     return replace(timeline, keys=tuple(_restore_order(moved)))
+
+
+def _list_near_touches(key: KeyMoment, touches: Sequence[PlayerTouch]) -> range:
+    """List the numbers of the touches, in order of time, that may be close enough to a key moment."""
+    reach = MAX_TOUCH_OFFSET + 1e-6  # more than rounding can change
+    return range(bisect_left(touches, key.time - reach, key=attrgetter("time")),
+                 bisect_right(touches, key.time + reach, key=attrgetter("time")))
 
 
 def _compute_mismatch(key: KeyMoment, touch: PlayerTouch) -> float:
