@@ -78,6 +78,10 @@ class MatchFolder:
         folder.mkdir(parents=True, exist_ok=True)
         return folder / f"{name}.npz"
 
+    def has_pieces(self, kind: str) -> bool:
+        """Say whether there is any piece of a kind."""
+        return any((self.path / _WORK / kind).glob("*.npz"))
+
     def remove_pieces(self, kind: str, keep: Iterable[str]) -> None:
         """Remove all pieces of a kind except the names in `keep`."""
         kept_names = {f"{name}.npz" for name in keep}

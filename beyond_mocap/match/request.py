@@ -252,9 +252,10 @@ def _add_parts_to_hash(hashed, value: object) -> None:
 
 def _add_fields_to_hash(hashed, value: Any) -> None:
     """Add a dataclass: rows of a field's name and its content."""
-    rows = [(begin, getattr(value, name), is_later) for name, begin, is_later in _list_fields(type(value))]
+    kind: type = type(value)
+    rows = [(begin, getattr(value, name), is_later) for name, begin, is_later in _list_fields(kind)]
     parts = [(begin, content) for begin, content, is_later in rows if not is_later or content]
-    hashed.update(f"{type(value).__name__} {len(parts)}\0".encode())
+    hashed.update(f"{kind.__name__} {len(parts)}\0".encode())
     for begin, content in parts:
         hashed.update(begin)
         _add_to_hash(hashed, content)

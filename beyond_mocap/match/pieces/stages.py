@@ -7,8 +7,9 @@ edit only affected pieces are computed again.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from ..player_file import write_player
 from ..player_plans import PlayerPlans
 from .constructed_motion import ConstructedMotion
 from .job import Job, remove_library_paths, run_stage
+from .motion_parts import MotionSpan
 from .pool import TaskFailure
 from .tasks import FinishRequest, finish_player, resolve_collision_window, search_unit
 from .units import build_units
@@ -132,25 +134,32 @@ def resolve_player_collisions(job: Job, motion: ConstructedMotion, span: tuple[f
         Correction by player id.
     """
     windows = _build_windows(span, min(job.request.window, MAX_SECONDS), job.request.fps)
+
+    def find_file(number: int) -> Path:
+        return job.folder.piece_path(CROWD, _name_window(job, motion.edits, *windows[number]))
+
     while True:
-        players, names = list(motion.edits), [_name_window(job, motion.edits, *window) for window in windows]
-        found = _load_windows(job, names, len(players))
+        # names take seconds: where nothing is stored they are built beside the workers' results
+        players, is_stored = list(motion.edits), job.folder.has_pieces(CROWD)
+        found = _load_windows(map(find_file, range(len(windows))), len(players)) if is_stored else {}
         if motion.construct(_widen(*window) for number, window in enumerate(windows) if number not in found):
             break
     if not players:
         return {}
     tasks = ((number, (job.source, [motion.find_spans(player, *_widen(*window)) for player in players], *window))
              for number, window in enumerate(windows) if number not in found)
+    files = {number: find_file(number) for number in found}
     for number, result in run_stage(job, tasks, resolve_collision_window, CROWD):
+        files[number] = find_file(number)
         if isinstance(result, TaskFailure):
             start, end = windows[number]
             when = f"{format_seconds(start)}-{format_seconds(end)} s"
             job.state.report["notes"].append(f"{when}: collisions are not resolved: {result.reason}")
             continue
-        save_parts(job.folder.piece_path(CROWD, names[number]), result)
+        save_parts(files[number], result)
         found[number] = result
         job.report(len(found) / len(windows), f"Resolving collisions: {len(found)} of {len(windows)} windows")
-    job.folder.remove_pieces(CROWD, names)
+    job.folder.remove_pieces(CROWD, (file.stem for file in files.values()))
     rows = [(found[number], windows[number]) for number in sorted(found)]
     return {player: join_windows([(parts[place], window) for parts, window in rows], job.request.fps)
             for place, player in enumerate(players)}  # fmt: skip
@@ -166,9 +175,9 @@ def _name_window(job: Job, edits: dict[str, PlayerEdit], start: float, end: floa
     return job.build_name(start, end, remove_library_paths(cut))
 
 
-def _load_windows(job: Job, names: Sequence[str], count: int) -> dict[int, tuple[PlayerCorrection, ...]]:
+def _load_windows(files: Iterable[Path], count: int) -> dict[int, tuple[PlayerCorrection, ...]]:
     """Load the results of the windows that are stored, by number; count: of players."""
-    loaded = ((number, load_parts(job.folder.piece_path(CROWD, name))) for number, name in enumerate(names))
+    loaded = ((number, load_parts(file)) for number, file in enumerate(files))
     return {number: parts for number, parts in loaded if parts is not None and len(parts) == count}
 
 
@@ -192,63 +201,102 @@ def finish_players(
         crowd: correction by player id.
         ball: the match's ball.
     """
-    parts_by_id = {part.role.player.id: part for part in parts if part.role.player.id in motion.edits}
-    names: dict[str, str] = {}
-    for player, part in parts_by_id.items():
-        edit = replace(motion.edits[player], correction=crowd[player].correction)
-        write_player(job.folder.player_path(part.file, "take.npz"), edit)
-        found, order = crowd[player], job.request
-        depends_on = (remove_library_paths([edit])[0], part.role.measured, ball, found.frames, found.depth,
-                      order.figures, order.bvh, part.role.player, part.role.notes)
-        names[player] = job.build_name(*depends_on)
-    missing = [player for player, part in parts_by_id.items() if not _is_finished(job, part, names[player])]
-    if job.request.figures or job.request.bvh:
+    request = job.request
+    files = {part.role.player.id: _PlayerFiles(job, part, motion.edits[part.role.player.id],
+                                               crowd[part.role.player.id], ball)
+             for part in parts if part.role.player.id in motion.edits}
+    missing = [player for player, one in files.items() if not one.are_finished()]
+    for player in files.keys() - set(missing):
+        files[player].write_edit()
+    if request.figures or request.bvh:
         motion.construct([_ALWAYS], missing)
-    tasks = ((player, (job.source, _build_finish_request(job, parts_by_id[player], motion, crowd[player], ball)))
-             for player in missing if player in motion.edits)
-    done = len(parts_by_id) - len(missing)
-    for player, result in run_stage(job, tasks, finish_player, "figures"):
+
+    def iter_tasks() -> Iterator[tuple[str, tuple]]:
+        for player in missing:
+            if player in motion.edits:
+                files[player].write_edit()
+                spans = motion.find_spans(player, *_ALWAYS) if request.figures or request.bvh else ()
+                yield player, (job.source, files[player].build_request(spans))
+
+    done = len(files) - len(missing)
+    for player, result in run_stage(job, iter_tasks(), finish_player, "figures"):
         if isinstance(result, TaskFailure):
             job.state.mark_failed(player, result)
             continue
-        files = _write_files(job, parts_by_id[player], result, names[player])
+        row = files[player].write_result(result)
         done += 1
-        job.report(done / len(parts_by_id), f"Figures: {done} of {len(parts_by_id)} players")
-        job.state.update_player(player, status="done", **files)
+        job.report(done / len(files), f"Figures: {done} of {len(files)} players")
+        job.state.update_player(player, status="done", **row)
 
 
-def _build_finish_request(job: Job, part: PlayerPlans, motion: ConstructedMotion, found: PlayerCorrection,
-                          ball: BallPath) -> FinishRequest:
-    spans = motion.find_spans(part.role.player.id, *_ALWAYS) if job.request.figures or job.request.bvh else ()
-    return FinishRequest(motion=spans, correction=found.correction, measured=part.role.measured, ball=ball,
-                         frames=found.frames, depth=found.depth, figures=job.request.figures, bvh=job.request.bvh)
+@dataclass(frozen=True, eq=False)
+class _PlayerFiles:
+    """A player's files at the end of a match.
 
+    Attributes:
+        job: what all stages share.
+        part: the player's plans.
+        edit: the edit list, before it is corrected.
+        found: the correction, with what remains of overlaps.
+        ball: the match's ball.
+    """
 
-def _is_finished(job: Job, part: PlayerPlans, name: str) -> bool:
-    """Say whether an earlier run wrote this player's files; if so, record them again."""
-    endings = {"report": "report.json", "provenance": "provenance.csv"} if job.request.figures else {}
-    endings |= {"bvh": "bvh"} if job.request.bvh else {}
-    files = {kind: job.folder.player_path(part.file, ending) for kind, ending in endings.items()}
-    player = part.role.player.id
-    if job.state.players[player].get("finished") != name or not all(path.is_file() for path in files.values()):
-        return False
-    job.state.update_player(player, status="done", **{kind: path.name for kind, path in files.items()})
-    return True
+    job: Job
+    part: PlayerPlans
+    edit: PlayerEdit
+    found: PlayerCorrection
+    ball: BallPath
 
+    def are_finished(self) -> bool:
+        """Say whether an earlier run wrote the files; if so, record them again."""
+        job, player = self.job, self.part.role.player.id
+        endings = {"report": "report.json", "provenance": "provenance.csv"} if job.request.figures else {}
+        endings |= {"bvh": "bvh"} if job.request.bvh else {}
+        files = {kind: job.folder.player_path(self.part.file, ending) for kind, ending in endings.items()}
+        finished = job.state.players[player].get("finished")
+        if finished is None or not all(path.is_file() for path in files.values()) or finished != self._build_name():
+            return False
+        job.state.update_player(player, status="done", **{kind: path.name for kind, path in files.items()})
+        return True
 
-def _write_files(job: Job, part: PlayerPlans, result, name: str) -> dict[str, str]:
-    """Write a player's files; return their names for the player's row and discard what an earlier run recorded."""
-    job.state.update_player(part.role.player.id, finished=None)
-    row = {"finished": name}
-    for ending, content in result.files.items():
-        path = job.folder.player_path(part.file, ending)
-        atomic_write(path, content)
-        row.setdefault(ending.rpartition(".")[2] if ending.endswith("bvh") else ending.partition(".")[0], path.name)
-    if result.report is not None:
-        path, player = job.folder.player_path(part.file, "report.json"), part.role.player
-        who = {"id": player.id, "team": player.team, "number": player.number, "name": player.name}
-        took = {**result.report["seconds"], "search": job.state.players[player.id]["search_s"]}
-        whole = {**result.report, **who, "seconds": took, "warnings": [*result.report["warnings"], *part.role.notes]}
-        atomic_write(path, json.dumps(to_plain(whole), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
-        row["report"] = path.name
-    return row
+    def write_edit(self) -> None:
+        """Write the corrected edit list."""
+        write_player(self.job.folder.player_path(self.part.file, "take.npz"), self._corrected)
+
+    def build_request(self, spans: tuple[MotionSpan, ...]) -> FinishRequest:
+        """Build what a worker needs; spans: the player's motion, () where it is not needed."""
+        request, found = self.job.request, self.found
+        return FinishRequest(motion=spans, correction=found.correction, measured=self.part.role.measured,
+                             ball=self.ball, frames=found.frames, depth=found.depth, figures=request.figures,
+                             bvh=request.bvh)
+
+    def write_result(self, result) -> dict[str, str]:
+        """Write what a worker returned; return the names for the player's row and discard what an earlier run
+        recorded.
+        """
+        job, player = self.job, self.part.role.player
+        job.state.update_player(player.id, finished=None)
+        row = {"finished": self._build_name()}
+        for ending, content in result.files.items():
+            path = job.folder.player_path(self.part.file, ending)
+            atomic_write(path, content)
+            row.setdefault(ending.rpartition(".")[2] if ending.endswith("bvh") else ending.partition(".")[0], path.name)
+        if result.report is not None:
+            path = job.folder.player_path(self.part.file, "report.json")
+            who = {"id": player.id, "team": player.team, "number": player.number, "name": player.name}
+            took = {**result.report["seconds"], "search": job.state.players[player.id]["search_s"]}
+            whole = {**result.report, **who, "seconds": took,
+                     "warnings": [*result.report["warnings"], *self.part.role.notes]}
+            atomic_write(path, json.dumps(to_plain(whole), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+            row["report"] = path.name
+        return row
+
+    @property
+    def _corrected(self) -> PlayerEdit:
+        return replace(self.edit, correction=self.found.correction)
+
+    def _build_name(self) -> str:
+        """Name the files by all that they depend on."""
+        role, found, request = self.part.role, self.found, self.job.request
+        return self.job.build_name(remove_library_paths([self._corrected])[0], role.measured, self.ball, found.frames,
+                                   found.depth, request.figures, request.bvh, role.player, role.notes)
