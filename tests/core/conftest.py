@@ -36,6 +36,7 @@ SAMPLE_LIBRARY = HERE.parents[1] / "sample_blend" / "library"
 RECORDINGS = HERE.parents[2] / "shared" / "data" / "mocap" / "cmu10"
 
 
+@pytest.hookimpl(tryfirst=True)  # xdist reads the groups in the same hook
 def pytest_collection_modifyitems(items):
     """The tests of one room run in one process, so that its session fixtures are made once; so do all checks of the
     source, which share its syntax trees."""

@@ -261,7 +261,7 @@ class _PlayerFiles:
 
     def write_edit(self) -> None:
         """Write the corrected edit list."""
-        write_player(self.job.folder.player_path(self.part.file, "take.npz"), self._corrected)
+        write_player(self.job.folder.player_path(self.part.file, "take.npz"), self._apply_correction())
 
     def build_request(self, spans: tuple[MotionSpan, ...]) -> FinishRequest:
         """Build what a worker needs; spans: the player's motion, () where it is not needed."""
@@ -291,12 +291,12 @@ class _PlayerFiles:
             row["report"] = path.name
         return row
 
-    @property
-    def _corrected(self) -> PlayerEdit:
+    def _apply_correction(self) -> PlayerEdit:
         return replace(self.edit, correction=self.found.correction)
 
     def _build_name(self) -> str:
         """Name the files by all that they depend on."""
         role, found, request = self.part.role, self.found, self.job.request
-        return self.job.build_name(remove_library_paths([self._corrected])[0], role.measured, self.ball, found.frames,
-                                   found.depth, request.figures, request.bvh, role.player, role.notes)
+        depends_on = (remove_library_paths([self._apply_correction()])[0], role.measured, self.ball, found.frames,
+                      found.depth, request.figures, request.bvh, role.player, role.notes)
+        return self.job.build_name(*depends_on)
