@@ -25,6 +25,7 @@ CACHE_FOLDER = ".beyond_mocap"
 CLASSIFIER_FILE = "learned_words.npz"
 """Name of the learned classifier of labels in the cache's folder."""
 TABLE_NAME = "annotations.csv"
+_CONVERT = "press Build Library in Blender, or run batch.py -- library in it"
 _TABLE, _FORM = "converted.json", 1  # raised when conversions hold more: Blender then converts again
 
 
@@ -114,7 +115,7 @@ def find_readable_clips(folder: str | Path, place: str | Path) -> tuple[list[Pat
     ready = [path for path in found if path not in waiting_set]
     if not ready and waiting:
         what = f"no clip in the folder that can be read, but {len(waiting)} that only Blender reads ({waiting[0].name})"
-        raise InputError(folder, what, "at least one .bvh", "press Build Library in Blender")
+        raise InputError(folder, what, "at least one .bvh", _CONVERT)
     if not ready:
         raise InputError(folder, "no clip in the folder", "at least one .bvh or .npz", "copy recordings into it")
     return ready, conversions, describe_waiting(waiting)
@@ -297,7 +298,7 @@ def describe_waiting(waiting: Sequence[Path]) -> list[str]:
         return []
     count, kinds = len(waiting), ", ".join(sorted({path.suffix.lower() for path in waiting}))
     return [f"{format_count(count, 'clip')} skipped ({kinds}: {waiting[0].name}): not converted; "
-            "press Build Library in Blender to convert them"]
+            f"{_CONVERT}"]
 
 
 def read_stamp(path: Path) -> list[int]:

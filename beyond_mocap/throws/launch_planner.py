@@ -148,9 +148,10 @@ class LaunchPlanner:
             raise InputError("speed", f"{requested:.1f} m/s", f"at least {slowest:.1f} m/s to reach the target",
                              "set a higher speed")  # fmt: skip
         if max(slowest, requested) > _MAX_SPEED_RATIO * own:
-            what, found = ("speed", f"{requested:.0f} m/s") if requested else ("target", f"it needs {slowest:.0f} m/s")
-            most = f"at most {_MAX_SPEED_RATIO * own:.0f} m/s, since the model's fastest example has {own:.0f}"
-            raise InputError(what, found, most, "choose a lower speed, or train on faster examples")
+            what, found, action = ("speed", f"{requested:.1f} m/s", "choose a lower speed") if requested else (
+                "target", f"it needs {slowest:.1f} m/s", "choose a nearer target")
+            most = f"at most {_MAX_SPEED_RATIO * own:.1f} m/s, since the model's fastest example has {own:.1f}"
+            raise InputError(what, found, most, f"{action}, or train on faster examples")
 
     def _rank_launch_requests(self, ahead: float) -> list[LaunchRequest]:
         """List launch requests, the best first, each of another speed.

@@ -102,7 +102,7 @@ def compare_methods(
 ) -> MethodComparison:
     """Synthesize every scenario by every method and measure the takes.
 
-    Labels that the library lacks are replaced by the nearest ones, for all methods alike.
+    Where no recording carries the labels of a key moment, the nearest ones serve, for all methods alike.
 
     Args:
         library: the clips.
@@ -139,7 +139,8 @@ def measure_take(take: Take, library: Library, timeline: Timeline, seconds: floa
     """Measure a take.
 
     Beside the labels that the method was asked for, `asked` measures those of the scenario alone: automatic locomotion
-    differs by method, since only "path" takes its gaits from the clips' labels.
+    differs by method, since only "path" takes its gaits from the clips' labels. Labels that no recording carries count
+    for no method.
 
     Args:
         take: the take.
@@ -149,7 +150,8 @@ def measure_take(take: Take, library: Library, timeline: Timeline, seconds: floa
     """
     played = playback_from_take(take)
     view = View(played, take.plan.track, take.timeline, library)
-    labels = list_requested_labels(timeline, played.times, view.moments)
+    labels = [row and (row & library.labels) or None
+              for row in list_requested_labels(timeline, played.times, view.moments)]
     asked = measure_similarity(labels, played.words)
     similarity = {**measure_annotation_similarity(view),
                   "asked": float(np.nanmean(asked)) if np.isfinite(asked).any() else np.nan}

@@ -71,8 +71,8 @@ _SYNTHETIC_INSTEAD = (
     (TURN_PREFIX, "turns", "synthetic ones are shown"),
     (STEP_PREFIX, "moves", "synthetic ones are shown"),
 )
+_KICK, _KICKS = "kick", SYNTHETIC_FOLDER + KICK_PREFIX  # the label, and how the paths of its synthetic clips begin
 _SYNTHETIC_KINDS = (
-    (SYNTHETIC_FOLDER + KICK_PREFIX, "synthetic kick on the run: no recorded kick is as fast as the player"),
     (SYNTHETIC_FOLDER + STAND_PREFIX,
      "a recorded stand is played forward and backward: no recording stands for so long"),
     (SYNTHETIC_FOLDER + LOOP_PREFIX,
@@ -196,12 +196,23 @@ def _report_synthetic(played: Playback, library: Library | None) -> list[TimedMe
     kinds = [(_frames_of_clips(played, prefix), what) for prefix, what in _SYNTHETIC_KINDS]
     named = tuple(SYNTHETIC_FOLDER + prefix for prefix, *_ in _SYNTHETIC_INSTEAD if prefix)
     others = _frames_of_clips(played, SYNTHETIC_FOLDER) & ~_frames_of_clips(
-        played, SYNTHETIC_FOLDER + ACTION_PREFIX, *named, *(prefix for prefix, _ in _SYNTHETIC_KINDS))
+        played, SYNTHETIC_FOLDER + ACTION_PREFIX, _KICKS, *named, *(prefix for prefix, _ in _SYNTHETIC_KINDS))
+    kicks = _find_kicks(played)
+    kinds += [(kicks, "synthetic kick on the run: no recorded kick is as fast as the player"),
+              (_frames_of_clips(played, _KICKS) & ~kicks, "run-up of a synthetic kick: no recorded motion fits as well")]
     kinds += [(there, f"synthetic {name}: no recorded one fits") for name, there in _list_shown_actions(played)]
     kinds += [(_frames_of_clips(played, SYNTHETIC_FOLDER + prefix) if prefix else others, describe(kind, instead))
               for prefix, kind, instead in _SYNTHETIC_INSTEAD]
     return [_build_line(played.times, there, what, f" ({np.sum(there) / played.motion.fps:.1f} s in all)")
             for there, what in kinds]
+
+
+def _find_kicks(played: Playback) -> np.ndarray:
+    """Find the frames (T,) bool of synthetic kicks that are shown up to the kick, not for their run-up alone."""
+    shown = np.zeros(len(played.times), dtype=bool)
+    for first, end in find_runs(_frames_of_clips(played, _KICKS)):
+        shown[first:end] = played.words is None or any(_KICK in words for words in played.words[first:end])
+    return shown
 
 
 def _list_shown_actions(played: Playback) -> list[tuple[str, np.ndarray]]:
@@ -283,7 +294,7 @@ def _report_stretched_strides(played: Playback, track: Track | None, library: Li
     return _build_line(
         played.times, fast,
         f"the track reaches {most:.1f} m/s, faster than the library's {library.max_speed:.1f} m/s x "
-        f"{WARP_LIMITS[1]:g}: strides are stretched",
+        f"{WARP_LIMITS[1]:g}: no recording keeps up",
     )  # fmt: skip
 
 
