@@ -18,7 +18,7 @@ from beyond_mocap.base.errors import InputError, UserCancelledError
 from beyond_mocap.cli.outputs import ProgressReporter, check_outputs
 from beyond_mocap.cli.throwing import select_subjects
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.motion.skeleton import Skeleton
+from beyond_mocap.motion.motion import Motion
 from beyond_mocap.throws.evaluate_throws import RAW_OPTIONS
 from beyond_mocap.throws.network_npz import write_model
 from beyond_mocap.throws.networks.chains import Chains, find_chains
@@ -291,8 +291,8 @@ def train_folder(options, report: ProgressReporter) -> None:
     check_outputs(options.out, checkpoint, reserved=(options.config, options.skeleton))
     if options.resume:
         check_checkpoint(checkpoint)
-    skeleton = _read_skeleton(options.skeleton) if options.skeleton else None
-    examples = read_training_examples(options.folder, config, options.subject, skeleton, report)
+    target = _read_target(options.skeleton) if options.skeleton else None
+    examples = read_training_examples(options.folder, config, options.subject, target, report)
 
     def progress(share: float, text: str) -> None:
         report.show_progress(READING_SHARE + (1.0 - READING_SHARE) * share, text)
@@ -311,7 +311,7 @@ def train_folder(options, report: ProgressReporter) -> None:
 
 
 def read_training_examples(
-    folder: Path, config: TrainingConfig, subjects: Sequence[str], skeleton: Skeleton | None, report: ProgressReporter,
+    folder: Path, config: TrainingConfig, subjects: Sequence[str], target: Motion | None, report: ProgressReporter,
 ) -> list[Example]:
     """Read a folder's examples, all on one skeleton.
 
@@ -319,36 +319,36 @@ def read_training_examples(
         folder: folder of recordings.
         config: configuration of the training.
         subjects: names of the subjects to select; if empty, all.
-        skeleton: skeleton of the examples; None for that of the first one.
+        target: a motion on the skeleton of the examples; None for the first of them.
         report: receives notes and progress.
     Raises:
         InputError: if there is no example, or a subject is unknown.
     """
-    found = _read_selected(folder, config, subjects, skeleton, report)
-    first = found[0].motion.skeleton
-    if skeleton is None and not all(example.motion.skeleton.has_same_bones(first) for example in found):
+    found = _read_selected(folder, config, subjects, target, report)
+    first = found[0].motion
+    if target is None and not all(example.motion.skeleton.has_same_bones(first.skeleton) for example in found):
         found = _read_selected(folder, config, subjects, first, report)
     return found
 
 
-def _read_skeleton(path: Path) -> Skeleton:
-    """Read the skeleton of the model; InputError with the file's name if it lacks hands or feet."""
-    skeleton = bvh.read_bvh(path).motion.skeleton
+def _read_target(path: Path) -> Motion:
+    """Read a motion on the model's skeleton; InputError with the file's name if it lacks hands or feet."""
+    motion = bvh.read_bvh(path).motion
     try:
-        find_chains(skeleton)
+        find_chains(motion.skeleton)
     except InputError as error:
         raise InputError(path, str(error)) from None
-    return skeleton
+    return motion
 
 
-def _read_selected(folder, config: TrainingConfig, subjects, skeleton, report: ProgressReporter) -> list[Example]:
+def _read_selected(folder, config: TrainingConfig, subjects, target, report: ProgressReporter) -> list[Example]:
     """Read the examples and select the requested subjects."""
     def progress(share: float, text: str) -> None:
         report.show_progress(READING_SHARE * share, text)
 
     settings = config.settings
     found = read_examples(
-        folder, settings.action, settings.fps, skeleton, report.show_note, progress=progress,
+        folder, settings.action, settings.fps, target, report.show_note, progress=progress,
         cancelled=report.is_cancelled,
     )
     return select_subjects(found, subjects, folder)

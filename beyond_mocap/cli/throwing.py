@@ -352,7 +352,8 @@ def read_test_examples(folder: Path, model, reporter: ProgressReporter) -> list:
     if all(example.motion.skeleton.names == model.skeleton.names for example in examples):
         return examples
     reporter.show_note(f"{folder}: skeletons differ from the model's; motions are retargeted to it")
-    return read_examples(folder, settings.action, settings.fps, model.skeleton, cancelled=reporter.is_cancelled)
+    return read_examples(folder, settings.action, settings.fps, model.examples[0].motion,
+                         cancelled=reporter.is_cancelled)
 
 
 def select_subjects(examples, subjects, folder: Path) -> list:

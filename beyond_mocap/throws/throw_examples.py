@@ -31,7 +31,6 @@ from ..motion.motion import (
     sample_frames_cubic,
 )
 from ..motion.retargeting.retarget import Retargeter
-from ..motion.skeleton import Skeleton
 from ..synthetic.throws import find_grip
 from .networks.chains import find_chains
 from .networks.example import Example, build_example, mirror_example
@@ -51,7 +50,7 @@ _MAX_BELOW_FLOOR = 0.5  # m that a target may be below the estimated floor
 
 
 def read_examples(
-    folder: str | Path, action: str = "throw", fps: float = 30.0, skeleton: Skeleton | None = None,
+    folder: str | Path, action: str = "throw", fps: float = 30.0, target: Motion | None = None,
     report: Callable[[str], None] = lambda line: None, *, mirror: bool = False,
     progress: Callable[[float, str], None] = lambda share, text: None, cancelled: Callable[[], bool] = lambda: False,
 ) -> list[Example]:
@@ -61,7 +60,7 @@ def read_examples(
         folder: folder of recordings.
         action: "throw" or "kick".
         fps: frames per second of the examples.
-        skeleton: retarget all examples to this one; None keeps their own.
+        target: retarget all examples to its skeleton; it shows how that rig is used. None keeps their own.
         report: receives one line for each throw that is left out with the reason, and one for all recordings without
             any.
         mirror: also return the mirror image of each, with the other hand or foot.
@@ -73,14 +72,14 @@ def read_examples(
     """
     if action not in ACTIONS:
         raise InputError("action", action, " or ".join(ACTIONS))
-    if skeleton is not None:
-        find_chains(skeleton)
+    if target is not None:
+        find_chains(target.skeleton)
     folder = Path(folder)
     clips = find_clips(folder)
     names = [path.relative_to(folder).as_posix() for path in clips]
     annotations, table = Annotations(folder, clips), read_table(folder, ACTIONS[action], set(names))
     _report_missing(annotations, ACTIONS[action], folder, report)
-    retarget = _CachedRetargeter(skeleton)
+    retarget = _CachedRetargeter(target)
     found: list[Example] = []
     unannotated: list[str] = []
     for order, (path, name) in enumerate(zip(clips, names)):
@@ -159,18 +158,23 @@ def _read_clip(path, name: str, action: Action, annotations: Annotations, rows, 
 
 
 class _CachedRetargeter:
-    """Retarget motions to one skeleton; each rig is analysed once."""
+    """Retarget motions to one skeleton; each rig is analysed once.
 
-    def __init__(self, skeleton: Skeleton | None):
-        self.skeleton = skeleton
+    Another rig is compared with the target's motion: from its rest pose alone, necks and hands would be turned. Bodies
+    of one rig hold themselves as they were recorded.
+    """
+
+    def __init__(self, target: Motion | None):
+        self.target = target
         self._rigs: dict[str, Retargeter] = {}
 
     def __call__(self, motion: Motion) -> Motion:
-        if self.skeleton is None or motion.skeleton.has_same_bones(self.skeleton, 1e-4):
+        if self.target is None or motion.skeleton.has_same_bones(self.target.skeleton, 1e-4):
             return motion
         key = motion.skeleton.fingerprint
         if key not in self._rigs:
-            self._rigs[key] = Retargeter(motion, self.skeleton)
+            example = None if motion.skeleton.names == self.target.skeleton.names else self.target
+            self._rigs[key] = Retargeter(motion, self.target.skeleton, example=example)
         return self._rigs[key].retarget(motion)
 
 

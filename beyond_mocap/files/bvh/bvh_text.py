@@ -21,6 +21,7 @@ from ...base.errors import InputError, format_count
 POSITIONS = ("Xposition", "Yposition", "Zposition")
 ROTATIONS = ("Xrotation", "Yrotation", "Zrotation")
 _CHANNELS = {name.lower(): name for name in POSITIONS + ROTATIONS}
+_SHORTEST_FRAME, _LONGEST_FRAME = 0.001, 1.0  # s; what is longer is mostly in milliseconds
 _LARGEST_ANGLE = 1e7  # degrees; larger values are damaged
 _LARGEST_POSITION = 1e9  # 1000 km in millimetres
 _MOST_JOINTS = 2000  # bodies with fingers and faces have some hundreds
@@ -280,10 +281,10 @@ def _parse_motion_head(path: Path, data: bytes, start: int, line: int) -> tuple[
     time_text, start, line = _parse_labelled_value(path, data, start, line=line, label=rb"Frame\s*Time\s*:",
                                                    expected=expected)
     frame_time = _parse_number(time_text)
-    if frame_time is None or not 1e-5 <= frame_time <= 1e3:
+    if frame_time is None or not _SHORTEST_FRAME <= frame_time <= _LONGEST_FRAME:
         raise InputError(
-            f"{path}:{line - 1}", f"Frame Time: {time_text[:40]}", "seconds, above 0 (0.00001 to 1000)",
-            "correct that line",
+            f"{path}:{line - 1}", f"Frame Time: {time_text[:40]}",
+            f"seconds, {_SHORTEST_FRAME:g} to {_LONGEST_FRAME:g}: 0.0333333 for 30 frames per second", "correct that line",
         )
     return frames, frame_time, start, line
 

@@ -15,7 +15,7 @@ from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import identify_joints
-from beyond_mocap.motion.motion import forward_kinematics, place_motion
+from beyond_mocap.motion.motion import Motion, forward_kinematics, place_motion
 from beyond_mocap.motion.skeleton import Skeleton
 from beyond_mocap.throws.synthetic_examples import COLUMNS, generate_example, write_examples
 from beyond_mocap.throws.throw_examples import read_examples
@@ -106,11 +106,36 @@ def test_mirrored_copies_are_thrown_with_the_other_hand(folder):
 
 
 def test_all_on_one_skeleton(folder):
-    skeleton = bvh.read_bvh(clip(folder)).motion.skeleton
+    target = bvh.read_bvh(clip(folder)).motion
     own = read_examples(folder)[1]
-    there = read_examples(folder, skeleton=skeleton)[1]
-    assert there.motion.skeleton.has_same_bones(skeleton)
+    there = read_examples(folder, target=target)[1]
+    assert there.motion.skeleton.has_same_bones(target.skeleton)
     assert np.allclose(np.linalg.norm(there.launch), np.linalg.norm(own.launch), atol=0.5)
+
+
+def split_joint(motion: Motion, name: str) -> Motion:
+    """The same motion with another joint, which never turns, 1 cm above the joint `name`: its children hang there."""
+    skeleton = motion.skeleton
+    at = skeleton.names.index(name) + 1
+    offsets = np.insert(skeleton.offsets, at, [0.0, 0.0, 0.01], axis=0)
+    parents = [parent + (parent >= at) for parent in skeleton.parents]
+    parents = [at if parent == at - 1 else parent for parent in parents]
+    other = Skeleton((*skeleton.names[:at], f"{name}Split", *skeleton.names[at:]),
+                     (*parents[:at], at - 1, *parents[at:]), offsets)
+    rotations = np.insert(motion.rotations, at, [1.0, 0.0, 0.0, 0.0], axis=1)
+    return Motion(other, motion.root_positions, rotations, motion.fps)
+
+
+def test_another_rig_holds_head_and_hands_as_recorded(own):
+    target = read_examples(own)[0].motion
+    for path in sorted(own.rglob("*.bvh")):
+        bvh.write_bvh(path, split_joint(split_joint(bvh.read_bvh(path).motion, "Spine"), "Neck"))
+    there, plain = read_examples(own, target=target)[0].motion, target
+    body = identify_joints(target.skeleton)
+    for joint in (body.head, body.right.hand, body.left.hand):
+        off = quaternion.multiply(quaternion.inverse(forward_kinematics(plain)[1][:, joint]),
+                                  forward_kinematics(there)[1][:, joint])
+        assert np.degrees(np.median(np.linalg.norm(quaternion.to_rotation_vector(off), axis=1))) < 6.0
 
 
 def test_the_report_of_a_release_beside_it(own):
@@ -198,9 +223,9 @@ def test_folders_without_examples(own, tmp_path):
 def test_a_skeleton_without_hands_is_refused_before_anything_is_read(own):
     legs = Skeleton(("Hips", "LeftUpLeg", "LeftLeg", "LeftFoot", "RightUpLeg", "RightLeg", "RightFoot"),
                     (-1, 0, 1, 2, 0, 4, 5), [[0, 0, 0], *[[0, 0.1, 0], [0, 0, -0.4], [0, 0, -0.4]] * 2])  # fmt: skip
-    told = []
+    told, still = [], np.tile([1.0, 0.0, 0.0, 0.0], (1, 7, 1))
     with pytest.raises(InputError, match="^skeleton: no"):
-        read_examples(own, skeleton=legs, report=told.append)
+        read_examples(own, target=Motion(legs, np.zeros((1, 3)), still, 30.0), report=told.append)
     assert not told
 
 
