@@ -3,7 +3,8 @@
     python -m benchmarks [SECTION ...] [--seconds N] [--out FILE]
 
 A section that takes longer than N seconds is ended, which the results say. Results go to benchmarks/results.md, where
-sections that were not measured stay as they are. Seconds in tables are processor time.
+sections that were not measured stay as they are; one that is measured without the recordings has the shipped sample's
+tables alone. Seconds in tables are processor time.
 """
 
 from __future__ import annotations

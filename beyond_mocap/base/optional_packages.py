@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from importlib import import_module
 from types import ModuleType
 
@@ -28,6 +29,7 @@ def import_optional(name: str, where: object) -> ModuleType:
     """
     package = name.partition(".")[0]
     extra = _EXTRA_OF[package]
+    logging.getLogger(package).setLevel(logging.ERROR)  # Matplotlib warns in three lines of a home that is missing
     try:
         return import_module(name)
     except ImportError as error:

@@ -159,7 +159,12 @@ def _run_command(argv: list[str] | None, writers: Mapping[str, Writer], prog: st
         return int(done.code or 0)
     if reporter is not None:
         reporter.finish()
-    print(text if text.startswith(prog) else f"{prog}: {text}", file=sys.stderr)
+    try:
+        print(text if text.startswith(prog) else f"{prog}: {text}", file=sys.stderr)
+    except BrokenPipeError:
+        raise
+    except OSError:  # such as a full disk: the status says it
+        pass
     return status
 
 

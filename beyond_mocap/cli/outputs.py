@@ -175,7 +175,7 @@ def check_outputs(*paths: Path | None, reserved: tuple[Path | None, ...] = (), l
     is_any_there = any(path.is_file() for path in filter(None, paths))
     recorded = _identify_library_files(library) if library is not None and is_any_there else set()
     for path in filter(None, paths):
-        folder = path.absolute().parent
+        folder = path.resolve().parent  # a link is written where it leads
         if path.is_dir():
             raise InputError(path, "is a folder", "a file", "add a file name")
         if path.exists() and not path.is_file():

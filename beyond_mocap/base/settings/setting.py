@@ -15,7 +15,7 @@ LATER = {"later": True}
 default has changed since: the value that files without them have."""
 LATER_PART = {**LATER, "is_part": True}
 """Metadata of `LATER` fields that are left out of digests where they are empty: what lacks them keeps its digest."""
-POSITIVE: dict[str, Any] = {"least": 1e-9, "most": 1e6, "unit": "metres", "expected": "a positive number"}
+POSITIVE: dict[str, Any] = {"least": 1e-9, "most": 1e6, "unit": "metres", "expected": "a number from {least} to {most}"}
 
 # Choices shared by settings of several features: identifier, title, tooltip[, icon, number].
 PARTS = (

@@ -66,6 +66,13 @@ def test_off_the_track_is_told(jog, told, track_of):
     assert line == "10.0-18.0 s: the body is off the track by up to 0.30 m"
 
 
+def test_the_run_up_of_a_synthetic_kick_is_no_kick(jog, told):
+    made = replace(jog, clips=(f"{SYNTHETIC_FOLDER}kick_low_top_2.4_+30.bvh",), words=(("jogging",),) * len(jog.clip))
+    assert [line.split(": ", 1)[1][:10] for line in told(made)] == ["run-up of "]
+    kicked = replace(made, words=(*made.words[:200], *[("kick", "low")] * (len(made.words) - 200)))
+    assert [line.split(": ", 1)[1][:14] for line in told(kicked)] == ["synthetic kick"]
+
+
 def test_a_track_faster_than_the_library_is_told_but_not_where_running_is_made(jog, told):
     times = np.arange(10.0, 18.1, 0.04)
     fast = Track(times, np.stack([8.0 * (times - 10.0), 0 * times], axis=-1))

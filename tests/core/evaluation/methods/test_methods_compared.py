@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.evaluation.methods.comparison import choose_methods, compare_methods
+from beyond_mocap.evaluation.methods.comparison import choose_methods, compare_methods, measure_take
 from beyond_mocap.evaluation.methods.report import build_comparison_page, build_comparison_report
 from beyond_mocap.evaluation.methods.scenarios import check_labels, read_scenarios
 from beyond_mocap.evaluation.methods.tables import build_tables, describe_differences, format_markdown
@@ -74,6 +74,15 @@ def test_all_methods_are_measured_by_the_labels_of_the_scenario_alone(comparison
         assert result.figures["annotation_similarity"]["asked"] == pytest.approx(1.0 - 2.0 * met)
     similarity = build_tables(found)[1]
     assert all(row[2].endswith("(– / –)") for row in similarity.rows)  # "turn" asks for nothing
+
+
+def test_labels_that_no_recording_carries_count_for_no_method(comparison, timeline_of):
+    library, found = comparison
+    take = found.results["turn", "baseline"].take
+    asked, unknown, both = (
+        measure_take(take, library, timeline_of((0.0, 2.0, words)), 1.0).figures["annotation_similarity"]["asked"]
+        for words in ("running", "dribble", "dribble running"))
+    assert np.isnan(unknown) and both == asked
 
 
 def test_what_is_noted_of_scenarios_is_in_every_report(comparison):
