@@ -284,7 +284,8 @@ def _parse_motion_head(path: Path, data: bytes, start: int, line: int) -> tuple[
     if frame_time is None or not _SHORTEST_FRAME <= frame_time <= _LONGEST_FRAME:
         raise InputError(
             f"{path}:{line - 1}", f"Frame Time: {time_text[:40]}",
-            f"seconds, {_SHORTEST_FRAME:g} to {_LONGEST_FRAME:g}: 0.0333333 for 30 frames per second", "correct that line",
+            f"seconds, {_SHORTEST_FRAME:g} to {_LONGEST_FRAME:g}: 0.0333333 for 30 frames per second",
+            "correct that line",
         )
     return frames, frame_time, start, line
 

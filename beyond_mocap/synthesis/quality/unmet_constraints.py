@@ -198,8 +198,9 @@ def _report_synthetic(played: Playback, library: Library | None) -> list[TimedMe
     others = _frames_of_clips(played, SYNTHETIC_FOLDER) & ~_frames_of_clips(
         played, SYNTHETIC_FOLDER + ACTION_PREFIX, _KICKS, *named, *(prefix for prefix, _ in _SYNTHETIC_KINDS))
     kicks = _find_kicks(played)
+    run_ups = _frames_of_clips(played, _KICKS) & ~kicks
     kinds += [(kicks, "synthetic kick on the run: no recorded kick is as fast as the player"),
-              (_frames_of_clips(played, _KICKS) & ~kicks, "run-up of a synthetic kick: no recorded motion fits as well")]
+              (run_ups, "run-up of a synthetic kick: no recorded motion fits as well")]
     kinds += [(there, f"synthetic {name}: no recorded one fits") for name, there in _list_shown_actions(played)]
     kinds += [(_frames_of_clips(played, SYNTHETIC_FOLDER + prefix) if prefix else others, describe(kind, instead))
               for prefix, kind, instead in _SYNTHETIC_INSTEAD]
