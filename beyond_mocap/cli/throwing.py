@@ -83,7 +83,7 @@ def _add_synthesize(verbs):
     verb.add_argument("--target", type=_parse_point, required=True, metavar="X,Y,Z", help="metres, Z up")
     verb.add_argument("--out", type=parse_path, required=True, metavar="OUT.bvh", help="the motion")
     verb.add_argument("--model", type=parse_path, metavar="W.npz",
-                      help="default: the project's weights of synthetic motion, 10 to 14 cm off real kicks; "
+                      help="default: the project's weights of synthetic motion, 13 to 16 cm off real kicks; "
                       "recorded: its weights of five recorded kicks; see docs/reference/model-card.md")
     add_options(verb, "throw")
     place = verb.add_mutually_exclusive_group()

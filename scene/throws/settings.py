@@ -29,7 +29,7 @@ class BeyondMocapThrow(bpy.types.PropertyGroup):
     kick_model: StringProperty(
         name="Kick Model", subtype="FILE_PATH",
         description="Trained model (.npz) of kicks; if empty, the included one of synthetic kicks, which follows "
-        "recorded kicks to 10 to 14 cm only; the word recorded chooses the included one of five recorded kicks",
+        "recorded kicks to 13 to 16 cm only; the word recorded chooses the included one of five recorded kicks",
     )
     made_of: StringProperty(name="Settings Digest", options={"HIDDEN"},
                             description="Settings that the preview was generated with")
