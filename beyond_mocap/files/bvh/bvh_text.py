@@ -17,11 +17,13 @@ import numpy as np
 
 from ...base.content import read_bytes
 from ...base.errors import InputError, format_count
+from ...base.memory import check_memory
 
 POSITIONS = ("Xposition", "Yposition", "Zposition")
 ROTATIONS = ("Xrotation", "Yrotation", "Zrotation")
 _CHANNELS = {name.lower(): name for name in POSITIONS + ROTATIONS}
 _SHORTEST_FRAME, _LONGEST_FRAME = 0.001, 1.0  # s; what is longer is mostly in milliseconds
+_LARGE_FILE, _BYTES_PER_BYTE = 1e7, 4.0  # bytes; of memory for a byte of text: it is parsed, and motion is built of it
 _LARGEST_ANGLE = 1e7  # degrees; larger values are damaged
 _LARGEST_POSITION = 1e9  # 1000 km in millimetres
 _MOST_JOINTS = 2000  # bodies with fingers and faces have some hundreds
@@ -71,10 +73,13 @@ def read_bvh_text(path) -> BvhText:
     Returns:
         Its content.
     Raises:
-        InputError: with the line, if it is missing, truncated, damaged or not BVH.
+        InputError: with the line, if it is missing, truncated, damaged or not BVH; if less memory is free than it needs.
     """
     path = Path(path)
-    return parse_bvh_text(path, read_content(path))
+    data = read_content(path)
+    if len(data) > _LARGE_FILE:
+        check_memory(path, _BYTES_PER_BYTE * len(data), "cut it into shorter recordings")
+    return parse_bvh_text(path, data)
 
 
 def parse_bvh_text(path: Path, data: bytes) -> BvhText:

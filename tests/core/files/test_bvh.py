@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from beyond_mocap.base import memory
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.bvh import bvh, bvh_text
 from beyond_mocap.files.bvh.bvh_write import BvhForm
@@ -404,6 +405,15 @@ BAD = {
     "two bodies": (GOOD.replace(b"MOTION", b"ROOT b\n{\nOFFSET 0 0 0\n}\nMOTION"), "one ROOT"),
     "no joints": (b"HIERARCHY\nMOTION\nFrames: 1\nFrame Time: 1\n1\n", "no ROOT"),
 }
+
+
+def test_a_file_for_which_memory_lacks_is_refused_before_it_is_parsed(tmp_path, monkeypatch):
+    path = save(tmp_path, GOOD)
+    monkeypatch.setattr(memory, "read_free_bytes", lambda: 3.0 * len(GOOD))
+    bvh.read_bvh(path)  # a small one
+    monkeypatch.setattr(bvh_text, "_LARGE_FILE", 0)
+    with pytest.raises(InputError, match="a.bvh: this needs about .* free: cut it into shorter recordings"):
+        bvh.read_bvh(path)
 
 
 @pytest.mark.parametrize("case", BAD)
