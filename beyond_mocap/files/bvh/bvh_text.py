@@ -73,7 +73,7 @@ def read_bvh_text(path) -> BvhText:
     Returns:
         Its content.
     Raises:
-        InputError: with the line, if it is missing, truncated, damaged or not BVH; if less memory is free than it needs.
+        InputError: with the line, if it is missing, truncated, damaged or not BVH; if memory lacks for it.
     """
     path = Path(path)
     data = read_content(path)
