@@ -79,6 +79,7 @@ def run_retarget(options, reporter: ProgressReporter, writers: Mapping[str, Writ
         writers: further output formats, by file suffix (Blender's).
     """
     from ..library.common_skeleton import retarget_clip
+    from ..motion.humanoid import identify_posed_joints
 
     check_outputs(options.out, reserved=(options.input, options.to, options.map))
     write = _choose_clip_writer(options)
@@ -89,6 +90,9 @@ def run_retarget(options, reporter: ProgressReporter, writers: Mapping[str, Writ
     except InputError as error:
         if error.where != "skeleton":
             raise
+        for path, motion in ((options.input, clip.motion), (options.to, target.motion)):
+            with locate_errors(path):
+                identify_posed_joints(motion)
         raise InputError(f"{options.input} to {options.to}", str(error)) from None  # skeletons do not know the file
     notes = write(options.out, motion, target.form)
     lines = [*((options.input, note) for note in _list_notes(clip)), *((options.to, note) for note in target.notes[:1]),

@@ -109,5 +109,5 @@ def test_the_command_tells_bodies_without_legs_and_keeps_its_inputs(walk, tmp_pa
     for one, other in (("in", "stick"), ("stick", "in")):
         assert main(["retarget", names[one], "--to", names[other], "--out", names["out"]]) == 2
         told = capsys.readouterr().err.strip()
-        assert "\n" not in told and "stick.bvh" in told and "no joint found" in told
+        assert "\n" not in told and told.startswith(f"beyond-mocap: {names['stick']}: skeleton: no joint found")
     assert main(["retarget", names["in"], "--to", names["in"], "--out", names["in"]]) == 2
