@@ -5,7 +5,6 @@ In a folder without any annotation, labels are proposed (`library.proposals`), u
 
 from __future__ import annotations
 
-import errno
 import os
 import re
 from collections import deque
@@ -23,6 +22,7 @@ from ..annotation import ClipAnnotation
 from ..base.errors import InputError, UserCancelledError
 from ..base.memory import check_memory
 from ..base.settings import find_setting
+from ..files.atomic import FULL
 from ..files.clip_file import read_clip
 from ..files.motion_file import MappedMotions, MotionWriter
 from ..motion.motion import Motion
@@ -35,12 +35,13 @@ from .recorded_ball.ball_table import find_ball_table
 from .scan import (
     CLASSIFIER_FILE,
     Annotations,
+    describe_lone_texts,
     describe_misspelled_labels,
+    describe_unused_labels,
     find_readable_clips,
     find_recordings_and_labels,
     read_stamp,
 )
-from .unused_labels import describe_lone_texts, describe_unused_labels
 
 if TYPE_CHECKING:
     from .classify.classifier import Classifier
@@ -50,7 +51,6 @@ if TYPE_CHECKING:
 _BASE_BYTES = 1e8  # of memory that a build needs
 _BYTES_PER_BYTE = {".bvh": 4.0, ".npz": 16.0}  # of memory that it needs for a byte of its files: text is longer
 _ROUNDING_SECONDS = 0.1  # s after its clip's end up to which a row's end counts as rounded
-_FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 def build_library(
@@ -180,7 +180,7 @@ def _build_cached(recordings: _Recordings, place: Path, key: str, seed: int, rep
 
 def _describe_failure(place: Path, error: OSError) -> InputError:
     """Describe what ended a build in the cache's folder `place`: a full disk, or anything else."""
-    if error.errno in _FULL:
+    if error.errno in FULL:
         return InputError(place, f"the library's cache cannot be written ({error.strerror})", "",
                           "free space on its disk, or choose another cache folder")
     return InputError(error.filename or place, f"failed while the library was built ({error.strerror or error})",

@@ -12,12 +12,12 @@ from beyond_mocap.library.listing import scan_clips
 from beyond_mocap.library.scan import (
     Annotations,
     describe_misspelled_labels,
+    describe_unused_labels,
     find_clips,
     find_readable_clips,
     find_recordings_and_labels,
     list_own_recordings,
 )
-from beyond_mocap.library.unused_labels import describe_unused_labels
 
 HEADER = "file,fps,start_frame,end_frame,key_frame,labels,comment\n"
 
@@ -198,7 +198,7 @@ def test_rows_are_cut_to_their_clip_and_what_is_lost_is_told(tmp_path, clip_file
     lines = [note for note in build_library(tmp_path).notes if "cut to" in note]
     assert lines == ["walk.txt:2: the row ends at frame 3000000, cut to the clip's last, 30 (similar in 2 rows)"]
     (tmp_path / "walk.txt").write_text("# labels\n3 4 walking\n")
-    with pytest.raises(InputError, match=r"walk\.txt:2: a row that starts at frame 90; expected frames 0 to 30 of walk"):
+    with pytest.raises(InputError, match=r"walk\.txt:2: a row that starts at frame 90; expected frames 0 to 30"):
         build_library(tmp_path)
     (tmp_path / "walk.txt").unlink()
     (tmp_path / "annotations.csv").write_text(HEADER + row("walk.bvh", "walking", start=0, end=70, key=60))
