@@ -6,7 +6,7 @@ import csv
 import io
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 from ..base.errors import InputError
 from .text import parse_timeline, read_text
@@ -24,12 +24,14 @@ class ClipAnnotation:
         start, end: 0-based frames at the clip's own rate, end included.
         key: frame of the key moment (such as ball contact), None without one.
         words: the labels, from root to leaf, then modifiers.
+        place: file:line that it was read from, for messages only; "" if unknown.
     """
 
     start: float
     end: float
     key: float | None
     words: tuple[str, ...]
+    place: str = field(default="", compare=False, repr=False)
 
 
 def read_clip_annotations(path: str | os.PathLike, fps: float) -> tuple[ClipAnnotation, ...]:
@@ -46,7 +48,8 @@ def read_clip_annotations(path: str | os.PathLike, fps: float) -> tuple[ClipAnno
     Raises:
         InputError: if the file cannot be read or a line is invalid.
     """
-    return build_clip_annotations(parse_timeline(read_text(path), str(path), fps), fps)
+    rows = build_clip_annotations(parse_timeline(read_text(path), str(path), fps), fps)
+    return tuple(replace(row, place=f"{path}:{row.place}") for row in rows)
 
 
 def build_clip_annotations(timeline: Timeline, fps: float) -> tuple[ClipAnnotation, ...]:
@@ -56,7 +59,7 @@ def build_clip_annotations(timeline: Timeline, fps: float) -> tuple[ClipAnnotati
         timeline: seconds from the clip's first frame.
         fps: the clip's frame rate.
     Returns:
-        The annotations, ordered by start; see `read_clip_annotations`.
+        The annotations, ordered by start, their place the line alone; see `read_clip_annotations`.
     """
     spans = [span for span in timeline.spans if span.words and span.words != (TRANSITION,)]
     owners = [_find_owner(key, spans) for key in timeline.keys]
@@ -114,7 +117,8 @@ def _build_annotation(span: Span | None, key: KeyMoment | None, fps: float) -> C
     moment = None if key is None else round(key.time * fps)
     labels = dict.fromkeys((*(span.words if span else ()), *(key.words if key else ())))
     start, end = (span.start, span.end) if span else (key.time, key.time)
-    return ClipAnnotation(round(start * fps), round(end * fps), moment, tuple(labels))
+    line = (span or key).line
+    return ClipAnnotation(round(start * fps), round(end * fps), moment, tuple(labels), str(line or ""))
 
 
 def _check_columns(names, path) -> None:
@@ -141,7 +145,7 @@ def _parse_row(row: dict, labels: tuple[str, ...], place: str) -> ClipAnnotation
     if key is not None and not start <= key <= end:
         raise InputError(place, f"key_frame {key} outside {start} .. {end}", "a key frame within its row",
                          "correct the frames")
-    return ClipAnnotation(start, end, key, labels)
+    return ClipAnnotation(start, end, key, labels, place)
 
 
 def _parse_frame(text: str | None, name: str, place: str) -> int:

@@ -7,12 +7,19 @@ stderr, an operator puts it into Blender's report; no caller formats it again.
 from __future__ import annotations
 
 import os
+import re
 from typing import TYPE_CHECKING
 
 from .fixes import Fix
 
 if TYPE_CHECKING:
     from typing import Self
+
+
+_OTHER_VALUES = {"number": re.compile(r"(?:could not convert string to float|invalid literal for int\(\).*?): (.+)"),
+                 "time": re.compile(r"Invalid isoformat string: (.+)")}  # expected value -> Python's text without it
+_INNER_WORDS = re.compile(r"\b(array|arrays|shapes?|axis|dimensions?|broadcast|unpack|list|substring|iterable|sequence|"
+                          r"arg|argument|object|cannot convert|not supported)\b")  # of Python's and numpy's texts
 
 
 class BeyondMocapError(Exception):
@@ -167,10 +174,22 @@ def build_read_error(path: str | os.PathLike, kind: str, error: Exception | None
 
 
 def describe_damage(error: Exception) -> str:
-    """Describe what is wrong with a file's values by the error that reading them raised."""
+    """Describe what is wrong with a file's values by the error that reading them raised.
+
+    Args:
+        error: the exception; what it says is left out where that is about the program and not about the file.
+    Returns:
+        A phrase without a full stop.
+    """
+    text = " ".join(str(error).split())
     if isinstance(error, KeyError):
-        return f"no {str(error)[:60]}"
-    return f"values in other places, or of another kind, than expected ({type(error).__name__}: {error})"[:200]
+        return f"no {text[:60]}"
+    for kind, pattern in _OTHER_VALUES.items():
+        if other := pattern.fullmatch(text):
+            return f"{other[1][:60]} in the place of a {kind}"
+    found = "values in other places, or of another kind, than expected"
+    is_inner = not isinstance(error, ValueError) or not text or _INNER_WORDS.search(text)
+    return found if is_inner else f"{found} ({text})"[:200]
 
 
 def describe_no_folder(path: str | os.PathLike) -> str:

@@ -12,12 +12,15 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from ..base.digest import byte_digest
 from ..base.errors import InputError, describe_no_folder
 
 ABANDONED_SECONDS = 3600.0
 """Age, in seconds, from which on no running process writes what is temporary."""
 _TEMPORARY = re.compile(r"\..+\.\d+\.\d+\.part")  # names that `atomic_path` gives
 _TEMPORARY_FOLDER = re.compile(r"\.(\d+)\.\d+\.part")  # names that `atomic_folder` gives
+FULL = (errno.ENOSPC, errno.EDQUOT)
+"""Numbers of the errors that a full disk or quota gives."""
 _LEAST_FREE = 65536  # bytes on a disk below which a file written by another program may be cut off
 
 
@@ -31,21 +34,38 @@ def atomic_path(path: str | os.PathLike, ending: str = ".part") -> Iterator[Path
         path: the file.
         ending: suffix of the temporary path, for writers that depend on it.
     Raises:
-        InputError: if the folder is missing or not writable, and for devices and pipes.
+        InputError: if the folder is missing or not writable, or its disk full, and for devices and pipes.
     """
     path = Path(os.path.realpath(path)) if os.path.islink(path) else Path(path)
-    if path.exists() and not path.is_file() and not path.is_dir():  # renaming would replace a device
+    if os.path.exists(path) and not path.is_file() and not path.is_dir():  # renaming would replace a device
         raise InputError(path, "is a device or a pipe", "a regular file", "choose another file")
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.{threading.get_ident()}{ending}")
+    name = f"{path.name[:16]}-{byte_digest(os.fsencode(path.name)).hex()[:8]}"  # short, since names have a limit
+    temporary = path.with_name(f".{name}.{os.getpid()}.{threading.get_ident()}{ending}")
     try:
         yield temporary
         os.replace(temporary, path)
     except OSError as error:
-        problem = f"cannot be written ({error.strerror or error})"
-        raise InputError(path, problem, "a writable folder", "choose another place") from None
+        raise build_write_error(path, error) from None
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink()
+
+
+def build_write_error(path: Path, error: OSError) -> InputError:
+    """Build the error for a file or folder that cannot be written.
+
+    Args:
+        path: the file or folder.
+        error: what writing it raised.
+    Returns:
+        The error, with the next step for a full disk, for a name that is too long, or for a folder.
+    """
+    expected, step = "a writable folder", "choose another place"
+    if error.errno in FULL:
+        expected, step = "free space on its disk", "make room, or choose another folder"
+    elif error.errno == errno.ENAMETOOLONG:
+        expected, step = "a name that the disk allows", "choose a shorter one"
+    return InputError(path, f"cannot be written ({error.strerror or error})", expected, step)
 
 
 def remove_abandoned(folder: Path) -> None:
@@ -133,8 +153,7 @@ def atomic_folder(path: str | os.PathLike) -> Iterator[Path]:
             raise InputError(path, "another command has written to this folder meanwhile", "a folder for each command",
                              "choose another place") from None
         if isinstance(error, OSError):
-            problem = f"cannot be written ({error.strerror or error})"
-            raise InputError(path, problem, "a writable folder", "choose another place") from None
+            raise build_write_error(path, error) from None
         # name the file by its final path
         where, _, message = str(error).replace(str(temporary), str(path)).partition(": ")
         raise InputError(where, message) from None

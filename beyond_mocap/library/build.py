@@ -5,7 +5,7 @@ In a folder without any annotation, labels are proposed (`library.proposals`), u
 
 from __future__ import annotations
 
-import errno
+import os
 import re
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -22,6 +22,7 @@ from ..annotation import ClipAnnotation
 from ..base.errors import InputError, UserCancelledError
 from ..base.memory import check_memory
 from ..base.settings import find_setting
+from ..files.atomic import FULL
 from ..files.clip_file import read_clip
 from ..files.motion_file import MappedMotions, MotionWriter
 from ..motion.motion import Motion
@@ -31,7 +32,16 @@ from .clip import Clip, RepairFigures
 from .features import FPS, build_frames
 from .library import RECORDED_INDEX, Library, Progress
 from .recorded_ball.ball_table import find_ball_table
-from .scan import CLASSIFIER_FILE, Annotations, describe_misspelled_labels, find_readable_clips, read_stamp
+from .scan import (
+    CLASSIFIER_FILE,
+    Annotations,
+    describe_lone_texts,
+    describe_misspelled_labels,
+    describe_unused_labels,
+    find_readable_clips,
+    find_recordings_and_labels,
+    read_stamp,
+)
 
 if TYPE_CHECKING:
     from .classify.classifier import Classifier
@@ -40,7 +50,7 @@ if TYPE_CHECKING:
 
 _BASE_BYTES = 1e8  # of memory that a build needs
 _BYTES_PER_BYTE = {".bvh": 4.0, ".npz": 16.0}  # of memory that it needs for a byte of its files: text is longer
-_FULL = (errno.ENOSPC, errno.EDQUOT)
+_ROUNDING_SECONDS = 0.1  # s after its clip's end up to which a row's end counts as rounded
 
 
 def build_library(
@@ -74,13 +84,17 @@ def build_library(
     folder = Path(folder)
     report = progress or (lambda fraction, text: None)
     place, cache_note = cache.find_cache_folder(folder, cache_dir)
-    paths, conversions, waiting = find_readable_clips(folder, place)
+    recordings, labels = find_recordings_and_labels(folder)
+    paths, conversions, waiting = find_readable_clips(folder, place, recordings)
     files = [conversions.find_readable_file(path) for path in paths]
     annotations = Annotations(folder, paths)
     skeleton_file = Path(skeleton) if skeleton else None
     model = _find_model(place, annotations, paths)
     balls = [table for one in zip(paths, files) if (table := find_ball_table(*one)) is not None]
-    sources = [*annotations.list_sources(paths), *balls, *([model] if model else [])]
+    label_files = annotations.list_sources(paths)
+    sources = [*label_files, *balls, *([model] if model else [])]
+    messages = [*waiting, *describe_unused_labels(folder, recordings, labels, tables=annotations.tables,
+                                                  used=set(label_files))]
     digests = cache.SourceDigests(place)
     key = cache.compute_fingerprint(folder, files, sources, skeleton_file, digests, unit=unit)
     if not rebuild:
@@ -89,16 +103,15 @@ def build_library(
         if found is not None:
             write_synthetic_clips(place, _list_completed(found["clips"]), missing_only=True)
             digests.save()
-            found["notes"] += tuple(waiting)
+            found["notes"] += tuple(messages)
             return _remember(Library(folder=str(folder), cache_location=(place, key), seed=seed, **found))
     needed = sum(read_stamp(file)[0] * _BYTES_PER_BYTE[file.suffix.lower()] for file in files)
     check_memory(folder, _BASE_BYTES + needed, "use fewer or shorter clips")
-    messages = [*waiting, *cache.describe_outdated_cache(place)]
+    messages += cache.describe_outdated_cache(place)
     sources_read = _Recordings(
         folder=folder, paths=paths, files=files, annotations=annotations, unit=unit, threads=threads,
         skeleton=skeleton_file, classifier=_read_model(model) if model else None,
-        notes=(*([cache_note] if cache_note else []), *annotations.describe_unknown_files(folder),
-               *annotations.describe_lone_texts(folder)),
+        notes=(*([cache_note] if cache_note else []), *describe_lone_texts(folder, recordings, labels)),
     )
     library = _build_cached(sources_read, place, key, seed, report=report, cancelled=cancelled)
     digests.save()
@@ -167,7 +180,7 @@ def _build_cached(recordings: _Recordings, place: Path, key: str, seed: int, rep
 
 def _describe_failure(place: Path, error: OSError) -> InputError:
     """Describe what ended a build in the cache's folder `place`: a full disk, or anything else."""
-    if error.errno in _FULL:
+    if error.errno in FULL:
         return InputError(place, f"the library's cache cannot be written ({error.strerror})", "",
                           "free space on its disk, or choose another cache folder")
     return InputError(error.filename or place, f"failed while the library was built ({error.strerror or error})",
@@ -216,7 +229,7 @@ def _read_clips(recordings: _Recordings, arrays: Path | None, notes: list[str], 
         seen.append(ball)
     notes += _collect_unit_notes(units)
     motions = levelled.finish()
-    rows = _read_rows(recordings, motions)
+    rows = _read_rows(recordings, motions, notes)
     is_proposed = not any(rows)
     repaired = MotionWriter(arrays and arrays / "repaired.npy")
     repairs, contacts = _repair_clips(recordings, motions, [drift for _, drift in changes], repaired, notes=notes,
@@ -265,10 +278,26 @@ def _repair_clips(recordings: _Recordings, motions: Sequence[Motion], drifts: Se
     return repairs, contacts
 
 
-def _read_rows(recordings: _Recordings, motions: Sequence[Motion]) -> list[tuple[ClipAnnotation, ...]]:
-    """Read the annotations of all clips."""
-    read = recordings.annotations.read_rows
-    return [_limit_rows(path, read(path, motion.fps), len(motion)) for path, motion in zip(recordings.paths, motions)]
+def _read_rows(recordings: _Recordings, motions: Sequence[Motion],
+               notes: list[str]) -> list[tuple[ClipAnnotation, ...]]:
+    """Read the annotations of all clips, cut to the clips; notes get a line about rows that lose more than rounding."""
+    found, cut = [], []
+    for path, motion in zip(recordings.paths, motions):
+        rows, last = recordings.annotations.read_rows(path, motion.fps), len(motion) - 1
+        found.append(_limit_rows(path, rows, len(motion)))
+        cut += [(row, last) for row in rows if row.end - last > max(1.0, _ROUNDING_SECONDS * motion.fps)]
+    notes += _describe_cut_rows(cut, recordings.folder)
+    return found
+
+
+def _describe_cut_rows(cut: Sequence[tuple[ClipAnnotation, int]], folder: Path) -> list[str]:
+    """Describe in a line the rows that end after their clip; each with the clip's last frame."""
+    if not cut:
+        return []
+    row, last = max(cut, key=lambda one: one[0].end - one[1])
+    place = Path(os.path.relpath(row.place, folder)).as_posix()
+    similar = f" (similar in {len(cut)} rows)" if len(cut) > 1 else ""
+    return [f"{place}: the row ends at frame {row.end:.0f}, cut to the clip's last, {last}{similar}"]
 
 
 def _propose_rows(recordings: _Recordings, motions: Sequence[Motion], report: Progress,
@@ -347,11 +376,11 @@ def _iter_completed(recordings: _Recordings, motions: Sequence[Motion], rows: Se
 def _limit_rows(path: Path, rows: tuple[ClipAnnotation, ...], count: int) -> tuple[ClipAnnotation, ...]:
     """Cut rows to the clip; InputError for one that starts, or has its key moment, after the clip's end."""
     for row in rows:
+        place, expected = row.place or f"annotations of {path}", f"frames 0 to {count - 1} of {path.name}"
         if row.start >= count:
-            what = f"a row that starts at frame {row.start:g}"
-            raise InputError(path, what, f"frames 0 to {count - 1}", "correct the row")
+            raise InputError(place, f"a row that starts at frame {row.start:.0f}", expected, "correct the row")
         if row.key is not None and row.key >= count:
-            raise InputError(path, f"a key moment at frame {row.key:g}", f"frames 0 to {count - 1}", "correct the row")
+            raise InputError(place, f"a key moment at frame {row.key:.0f}", expected, "correct the row")
     return tuple(replace(row, end=min(row.end, count - 1)) for row in rows)
 
 

@@ -15,6 +15,7 @@ import json
 import os
 import secrets
 import shutil
+import stat
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -39,7 +40,7 @@ from .features import Frames, list_frame_arrays
 from .scan import CACHE_FOLDER, read_stamp
 
 # raised whenever what is computed or stored changes, so that old caches are not used
-VERSION = 45
+VERSION = 46
 MOTIONS = "motions.npy"
 """Name of the file with the motions of all clips (`files.motion_file`)."""
 _DIGESTS, _COVERAGE = "digests.json", "coverage"
@@ -141,11 +142,14 @@ def create_arrays_folder(place: Path, name: str = "library") -> Iterator[Path]:
     """Context manager: a new folder in `place` for the arrays of a library; removed if the block fails.
 
     Raises:
-        OSError: if it cannot be created, or something else has the place of the header.
+        OSError: if it cannot be created, or something else has the place of the header, or a header that only another
+            user may replace.
     """
-    is_new = not place.exists()
-    if (place / f"{name}.json").is_dir():
-        raise IsADirectoryError(f"{name}.json is a folder")
+    is_new, header = not place.exists(), place / f"{name}.json"
+    if header.is_dir():
+        raise IsADirectoryError(f"{header.name} is a folder")
+    if _belongs_to_another(header):
+        raise PermissionError(f"{header.name} belongs to another user")
     folder = place / f"{name}-{secrets.token_hex(_TOKEN_BYTES)}"
     folder.mkdir(parents=True)
     try:
@@ -156,6 +160,14 @@ def create_arrays_folder(place: Path, name: str = "library") -> Iterator[Path]:
             with suppress(OSError):  # not empty: another process works there
                 place.rmdir()
         raise
+
+
+def _belongs_to_another(file: Path) -> bool:
+    """Tell whether only another user may replace a file: in a folder with the sticky bit, as /tmp has it."""
+    if not hasattr(os, "geteuid") or not os.path.lexists(file):
+        return False
+    folder = file.parent.stat()
+    return bool(folder.st_mode & stat.S_ISVTX) and os.geteuid() not in (0, folder.st_uid, file.lstat().st_uid)
 
 
 def save_library(place: Path, key: str, library, *, arrays: Path, name: str = "library") -> None:
@@ -169,7 +181,7 @@ def save_library(place: Path, key: str, library, *, arrays: Path, name: str = "l
         arrays: folder of `create_arrays_folder`, which may have the motions already.
         name: of the file, without its ending.
     Raises:
-        OSError: if it cannot be written.
+        OSError, InputError: if it cannot be written.
     """
     if not (arrays / MOTIONS).exists():
         writer = MotionWriter(arrays / MOTIONS)
@@ -211,7 +223,7 @@ def save_arrays(place: Path, key: str, name: str, arrays: dict[str, np.ndarray])
         name: of the arrays.
         arrays: by name.
     """
-    with suppress(OSError), create_arrays_folder(place, name) as folder:
+    with suppress(OSError, InputError), create_arrays_folder(place, name) as folder:
         for part, values in arrays.items():
             np.save(folder / f"{part}.npy", values, allow_pickle=False)
         _publish(place, name, folder, {"key": key})
@@ -232,7 +244,7 @@ def save_coverage(place: Path, key: str, coverage: Coverage) -> None:
     """Save what the recordings lack, which takes as long to find as a take; a place that cannot be written is left
     alone.
     """
-    with suppress(OSError):
+    with suppress(InputError):
         _write_header(place, _COVERAGE, {"key": key, "coverage": asdict(coverage)})
 
 
@@ -265,12 +277,9 @@ def _digest_file(file: Path) -> str:
 
 
 def _write_header(place: Path, name: str, header: dict) -> None:
-    """Write the header behind a digest of it; OSError if that is not possible."""
+    """Write the header behind a digest of it; InputError if that is not possible."""
     text = json.dumps(header)
-    try:
-        atomic_write(place / f"{name}.json", f'"{byte_digest(text).hex()}"\n{text}')
-    except InputError as error:
-        raise OSError(str(error)) from None
+    atomic_write(place / f"{name}.json", f'"{byte_digest(text).hex()}"\n{text}')
 
 
 def _read_header(place: Path, name: str) -> dict:
@@ -353,7 +362,7 @@ def _list_sound_files(place: Path, name: str, header: dict) -> list[Path]:
                 raise ValueError(f"{file} is damaged")
             changed[file] = [*read_stamp(folder / file), digest]
     if changed:
-        with suppress(OSError):
+        with suppress(InputError):
             _write_header(place, name, {**header, "files": {**files, **changed}})
     return [folder / Path(file).name for file in files]
 

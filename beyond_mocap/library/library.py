@@ -332,7 +332,7 @@ def _build_synthetic_library(library: Library) -> Library:
 
 def _save_synthetic_library(place: Path, key: str, synthetic: Library) -> None:
     """Save the synthetic clips beside the cache of the recordings; a folder that cannot be written is left alone."""
-    with suppress(OSError), cache.create_arrays_folder(place, "made") as arrays:
+    with suppress(OSError, InputError), cache.create_arrays_folder(place, "made") as arrays:
         cache.save_library(place, key, synthetic, arrays=arrays, name="made")
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from .. import annotation
@@ -25,6 +25,10 @@ CACHE_FOLDER = ".beyond_mocap"
 CLASSIFIER_FILE = "learned_words.npz"
 """Name of the learned classifier of labels in the cache's folder."""
 TABLE_NAME = "annotations.csv"
+LABEL_ENDINGS = (".txt", TABLE_NAME)
+"""Endings of the names of files with labels."""
+Tables = Mapping[Path, Mapping[str, Sequence[annotation.ClipAnnotation]]]
+"""Absolute folder of a table -> file as spelled there -> its rows."""
 _CONVERT = "press Build Library in Blender, or run batch.py -- library in it"
 _TABLE, _FORM = "converted.json", 1  # raised when conversions hold more: Blender then converts again
 
@@ -56,7 +60,7 @@ def _check_files(paths: list[Path]) -> list[Path]:
 
 def find_recordings(folder: str | Path, endings: tuple[str, ...] = (*CLIP_ENDINGS, *FOREIGN)) -> list[Path]:
     """Find all files below `folder` with one of these endings, as `find_clips`, converted or not; the list may be
-    empty.
+    empty. A folder that has the name of a file with labels is found too, since it is none.
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -70,6 +74,7 @@ def find_recordings(folder: str | Path, endings: tuple[str, ...] = (*CLIP_ENDING
             folders.clear()
             continue
         seen.add(identity)
+        files += [name for name in folders if name.lower().endswith(LABEL_ENDINGS)]
         folders[:] = sorted(name for name in folders if name != CACHE_FOLDER)
         place = Path(parent)
         below = "".join(f"{part}/" for part in place.relative_to(folder).parts)
@@ -85,7 +90,20 @@ def list_own_recordings(folder: str | Path) -> list[Path]:
     """List the recordings that are a library's clips, as `find_recordings`; of `kick.bvh`, `kick.npz` and `kick.fbx`
     only the first.
     """
-    found = find_recordings(folder)
+    return _choose_forms(find_recordings(folder))
+
+
+def find_recordings_and_labels(folder: str | Path) -> tuple[list[Path], list[Path]]:
+    """Find a library's clips, as `list_own_recordings`, and everything that has the name of a file with labels."""
+    found = find_recordings(folder, (*CLIP_ENDINGS, *FOREIGN, *LABEL_ENDINGS))
+    kinds: tuple[list[Path], list[Path]] = [], []
+    for path in found:
+        kinds[path.name.lower().endswith(LABEL_ENDINGS)].append(path)
+    return _choose_forms(kinds[0]), kinds[1]
+
+
+def _choose_forms(found: list[Path]) -> list[Path]:
+    """Choose of recordings with one name the first form."""
     forms = [os.path.splitext(path) for path in found]
     best: dict[str, int] = {}
     for stem, ending in forms:
@@ -98,18 +116,21 @@ def _rank_form(ending: str) -> int:
     return CLIP_ENDINGS.index(ending.lower()) if ending.lower() in CLIP_ENDINGS else len(CLIP_ENDINGS)
 
 
-def find_readable_clips(folder: str | Path, place: str | Path) -> tuple[list[Path], Conversions, list[str]]:
+def find_readable_clips(folder: str | Path, place: str | Path,
+                        found: list[Path] | None = None) -> tuple[list[Path], Conversions, list[str]]:
     """Find the recordings of a library that can be read now.
 
     Args:
         folder: the library's folder.
         place: its cache folder.
+        found: its recordings, where they are known.
     Returns:
         The recordings, their conversions, and a line about recordings that are not converted yet.
     Raises:
         InputError: if none can be read, or one is a device or a pipe.
     """
-    found, conversions = _check_files(list_own_recordings(folder)), Conversions(folder, place)
+    found = _check_files(list_own_recordings(folder) if found is None else found)
+    conversions = Conversions(folder, place)
     waiting = conversions.list_waiting(found)
     waiting_set = set(waiting)
     ready = [path for path in found if path not in waiting_set]
@@ -166,34 +187,106 @@ class Annotations:
                     return tuple(rows)
         return ()
 
-    def describe_unknown_files(self, folder: Path) -> list[str]:
-        """Describe in a line the rows that name no recording of the library; a table above it serves other folders too.
-        """
-        top = _to_absolute(folder)
-        known = {_to_absolute(path) for path in list_own_recordings(folder)} if self.tables else set()
-        files = [(_to_absolute(place / name), place, name) for place in sorted(self.tables)
-                 for name in self.tables[place]]
-        unknown = [(place, name) for file, place, name in files
-                   if file not in known and top in (place, *place.parents, *file.parents)]
-        if not unknown:
-            return []
-        count = sum(len(self.tables[place][name]) for place, name in unknown)
-        rows = "1 row names a file that is" if count == 1 else f"{count} rows name files that are"
-        return [f"{TABLE_NAME}: {rows} not in the library, such as {unknown[0][1]}"]
-
-    def describe_lone_texts(self, folder: Path) -> list[str]:
-        """Describe in a line the texts with labels that lie beside no recording of their name."""
-        known = {path.with_suffix("") for path in list_own_recordings(folder)}
-        texts = [path for path in find_recordings(folder, (".txt",)) if path.with_suffix("") not in known]
-        lone = [path.relative_to(folder).as_posix() for path in texts if _has_labels(path)]
-        found = format_count(len(lone), "text with labels", "texts with labels")
-        return [f"{found} beside no recording of the name, such as {lone[0]}"] if lone else []
-
     def list_sources(self, clips: list[Path]) -> list[Path]:
         """List every file that was or would be read for annotations; the cache depends on them."""
         texts = [os.path.splitext(clip)[0] + ".txt" for clip in clips]
         return [*(Path(text) for text in texts if os.path.isfile(text)),
                 *(place / TABLE_NAME for place in sorted(self.tables))]
+
+
+def describe_unused_labels(folder: Path, recordings: Sequence[Path], labels: Sequence[Path], tables: Tables,
+                           used: Collection[Path]) -> list[str]:
+    """Describe the tables' rows that are not used, and what is no file where labels are expected, a line for each kind.
+
+    Args:
+        folder: the library's.
+        recordings: its clips.
+        labels: everything in it that has the name of a file with labels.
+        tables: those that may apply to clips.
+        used: files that labels are read from.
+    Returns:
+        The lines.
+    """
+    stems = {os.path.splitext(path)[0] for path in recordings}
+    expected = [path for path in (*labels, _to_absolute(folder).parent / TABLE_NAME) if path not in used
+                and (path.name == TABLE_NAME or os.path.splitext(path)[0] in stems)]
+    lone, lines = _read_lone_tables(path for path in expected if path.name == TABLE_NAME and path.is_file()
+                                    and _to_absolute(path.parent) not in tables)
+    return [*_describe_no_files(folder, [path for path in expected if os.path.lexists(path) and not path.is_file()]),
+            *_describe_unknown_files(folder, recordings, {**tables, **lone}), *lines]
+
+
+def _describe_no_files(folder: Path, found: Sequence[Path]) -> list[str]:
+    """Describe in a line what has the name of a file with labels and is a folder, a device, a pipe or a broken link."""
+    if not found:
+        return []
+    other = "is a device or a pipe" if found[0].exists() else "is a link to no file"
+    what = "is a folder" if found[0].is_dir() else other
+    similar = f" (similar in {len(found)} places)" if len(found) > 1 else ""
+    return [f"{_name_file(found[0], folder)}: {what}, so no labels are read from it{similar}; replace it by a file"]
+
+
+def _name_file(path: Path, folder: Path) -> str:
+    """Name a file by its path below the library, or above it."""
+    return Path(os.path.relpath(path, folder)).as_posix()
+
+
+def _read_lone_tables(files: Iterable[Path]) -> tuple[Tables, list[str]]:
+    """Read tables that no clip lies beside or below, and describe those that cannot be read."""
+    tables: dict[Path, Mapping[str, Sequence[annotation.ClipAnnotation]]] = {}
+    lines = []
+    for file in files:
+        try:
+            tables[_to_absolute(file.parent)] = annotation.read_annotation_csv(file)
+        except InputError as error:
+            lines.append(f"{error}; no clip is beside it or below, so it is not used")
+    return tables, lines
+
+
+def _describe_unknown_files(folder: Path, recordings: Sequence[Path], tables: Tables) -> list[str]:
+    """Describe in a line the rows that name no recording of the library as their table has to: by its path below the
+    table. A table above the library serves other folders too.
+    """
+    top = os.path.join(_to_absolute(folder), "")
+    known = {os.path.abspath(path).replace(os.sep, "/") for path in recordings} if tables else set()
+    unknown = [(place, name) for place in sorted(tables) for name in tables[place]
+               if f"{place.as_posix()}/{name}" not in known and _concerns_library(str(place), name, top)]
+    if not unknown:
+        return []
+    count = sum(len(tables[place][name]) for place, name in unknown)
+    rows = "1 row names a file that is" if count == 1 else f"{count} rows name files that are"
+    place, name = unknown[0]
+    table = _name_file(place / TABLE_NAME, folder)
+    where = f" in {table}" if "/" in table and not table.startswith("..") else ""
+    return [f"{TABLE_NAME}: {rows} not in the library, such as {name}{where}"]
+
+
+def _concerns_library(place: str, name: str, top: str) -> bool:
+    """Tell whether a row of the table in `place` has to name a recording below `top`."""
+    return os.path.join(place, "").startswith(top) or os.path.normpath(os.path.join(place, name)).startswith(top)
+
+
+def describe_lone_texts(folder: Path, recordings: Sequence[Path], labels: Sequence[Path]) -> list[str]:
+    """Describe in a line the texts with labels that lie beside no recording of their name.
+
+    Args:
+        folder, recordings, labels: see `describe_unused_labels`.
+    Returns:
+        The line, if there are such texts.
+    """
+    known = {path.with_suffix("") for path in recordings}
+    lone = [_name_file(path, folder) for path in labels if path.suffix.lower() == ".txt"
+            and path.with_suffix("") not in known and _has_labels(path)]
+    found = format_count(len(lone), "text with labels", "texts with labels")
+    return [f"{found} beside no recording of the name, such as {lone[0]}"] if lone else []
+
+
+def _has_labels(path: Path) -> bool:
+    """Say whether a text has labels of a clip, as a README or a licence has not."""
+    try:
+        return bool(annotation.read_clip_annotations(path, 30.0))
+    except InputError:
+        return False
 
 
 def describe_misspelled_labels(rows: Mapping[str, Sequence[annotation.ClipAnnotation]]) -> list[str]:
@@ -215,14 +308,6 @@ def describe_misspelled_labels(rows: Mapping[str, Sequence[annotation.ClipAnnota
 def _describe_more(clips: Sequence[str]) -> str:
     """Say how many recordings follow the first one."""
     return f" and {format_count(len(clips) - 1, 'more clip')}" if len(clips) > 1 else ""
-
-
-def _has_labels(path: Path) -> bool:
-    """Say whether a text has labels of a clip, as a README or a licence has not."""
-    try:
-        return bool(annotation.read_clip_annotations(path, 30.0))
-    except InputError:
-        return False
 
 
 def is_foreign(path: Path) -> bool:

@@ -22,7 +22,7 @@ from pathlib import Path
 
 from ..base.content import read_bytes
 from ..base.errors import InputError, describe_no_folder
-from ..files.atomic import atomic_write
+from ..files.atomic import atomic_write, build_write_error
 from ..files.tables import to_plain
 from .request import compute_digest
 
@@ -112,8 +112,7 @@ def open_folder(path: Path, identity: Mapping[str, object]) -> Iterator[MatchFol
     try:
         (path / _WORK).mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        found = f"cannot be written to ({error.strerror or error})"
-        raise InputError(path, found, "a writable folder", "choose another folder") from None
+        raise build_write_error(path, error) from None
     with _hold_lock(path / _WORK / _LOCK, path) as lock:
         try:
             _write_owner(lock, path)
@@ -260,8 +259,7 @@ def _write_owner(file: FileIO, folder: Path) -> None:
         file.truncate(0)
         file.write(str(os.getpid()).encode())
     except OSError as error:
-        found = f"cannot be written ({error.strerror or error})"
-        raise InputError(folder, found, "a writable folder", "choose another folder") from None
+        raise build_write_error(folder, error) from None
 
 
 def _acquire_lock(file) -> None:

@@ -161,8 +161,9 @@ def _read_samples(feed: Feed, pitch: tuple[float, float] | None, whose: Feed | N
         gc.collect()  # kloppy's frames refer to each other in circles: 1.3 GB of a match
         return samples
     except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError) as error:
-        raise InputError(feed.path, describe_damage(error), f"{feed.provider.title} tracking",
-                         "export it again") from None
+        others = f", in it or in {' or '.join(one.name for one in feed.meta)}" if feed.meta else ""
+        step = "export them again" if feed.meta else "export it again"
+        raise InputError(feed.path, describe_damage(error) + others, f"{feed.provider.title} tracking", step) from None
 
 
 def _convert_dataset(dataset, feed: Feed, pitch: tuple[float, float] | None) -> MatchSamples:

@@ -47,8 +47,10 @@ def read_trc(path: str | os.PathLike, unit: float | str | None = None, subject: 
     path = Path(path)
     lines = _read_lines(path)
     head = _parse_header(path, lines)
-    times, positions = _parse_rows(path, lines, head)
+    whole = _drop_cut_row(lines, head)
+    times, positions = _parse_rows(path, whole, head)
     fps, start, positions, notes = _align_to_rate(path, head, times, positions)
+    notes = [*notes, *_describe_early_end(head, len(positions), len(whole) < len(lines))]
     raw = RawMarkers(labels=head.labels, positions=positions, fps=fps, unit=head.unit, usual_up=(1, 1), start=start,
                      notes=[*head.notes, *notes])  # fmt: skip
     return build_trial(raw, path, unit, subject, up)
@@ -180,6 +182,27 @@ def _parse_values(lines: list[str], at: int, tabs: bool) -> dict[str, str]:
 
 
 # -- rows
+
+
+def _drop_cut_row(lines: list[str], head: _Header) -> list[str]:
+    """Drop the last row where the file ends within it: it has no line end, fewer cells or digits than the row before,
+    and the header says more frames.
+    """
+    rows = [line for line in lines[head.first_row:] if line.strip()]
+    if not lines[-1].strip() or not 1 < len(rows) < head.parse_number("numframes"):
+        return lines
+    ends = [(len(cells), len(cells[-1].replace(",", ".").partition(".")[2]))
+            for cells in (_split_cells(line, head.tabs) for line in rows[-2:])]
+    return lines[:-1] if ends[1] < ends[0] else lines
+
+
+def _describe_early_end(head: _Header, count: int, is_cut: bool) -> list[str]:
+    """Describe in a line that a file has fewer frames than its header says; no line where it has not."""
+    expected = head.parse_number("numframes")
+    if not count < expected:
+        return []
+    cut = ", and its last row, which is cut off, is left out" if is_cut else ""
+    return [f"{format_count(count, 'frame')}, not {expected:.0f} as in the header: the file ends early{cut}"]
 
 
 def _parse_rows(path: Path, lines: list[str], head: _Header) -> tuple[list[str], np.ndarray]:

@@ -2,6 +2,7 @@
 
 import json
 import pathlib
+import re
 from datetime import datetime, timedelta
 
 import numpy as np
@@ -306,6 +307,22 @@ def test_receivers_of_another_time_or_pitch_are_left_out(tmp_path):
         read_match(path, corners, cache_dir=tmp_path)
 
 
+@pytest.mark.parametrize("change, found", [
+    ({"teams": {"home": 5}}, "values in other places, or of another kind, than expected"),
+    ({"teams": {"home": {"players": [5]}}}, "values in other places, or of another kind, than expected"),
+    ({"stadium": {"pitch_length": [1], "pitch_width": 2}}, "values in other places, or of another kind, than expected"),
+    ({"stadium": {"pitch_length": "wide", "pitch_width": 2}}, "'wide' in the place of a number"),
+    ({"teams": {"home": {"players": [{"jersey_number": 7}]}}}, "no 'id'"),
+])
+def test_damaged_values_are_told_in_plain_words_with_the_metadata(change, found, tmp_path):
+    path = write_cdf(tmp_path)
+    meta = tmp_path / "game_meta.json"
+    meta.write_text(json.dumps({**json.loads(meta.read_text()), **change}))
+    with pytest.raises(InputError) as told:
+        read_match(path, cache_dir=tmp_path / "cache", provider="cdf")
+    assert str(told.value).startswith(f"{path}: {found}, in it or in game_meta.json; expected Common Data Format track")
+
+
 @pytest.mark.parametrize("form", WRITERS)
 @pytest.mark.parametrize("damage", ["truncated", "no players", "text"])
 def test_damaged_files_end_in_one_line(form, damage, tmp_path):
@@ -322,7 +339,8 @@ def test_damaged_files_end_in_one_line(form, damage, tmp_path):
     try:
         match = read_match(path, cache_dir=tmp_path / "cache", provider=PROVIDERS.get(form, PROVIDERS["gps"]).name)
     except InputError as error:
-        assert "\n" not in str(error) and "Traceback" not in str(error) and str(tmp_path) in str(error)
+        assert "\n" not in str(error) and str(tmp_path) in str(error)
+        assert not re.search(r"Traceback|Error:|' object|indices|invalid literal", str(error))
     else:
         assert len(match.players) and len(match.times) >= 2
 

@@ -107,6 +107,7 @@ def test_each_person_has_a_name_of_their_own(write, tmp_path):
      "places from 6000 to 1.18e+04 along and 1000 to 4100 across the pitch; expected StatsBomb's units, 0 to 120"),
     ({"events": ({**PASS, "location": [-50.0, -20.0]},)}, [], "events.json: places from -50"),
     ({"events": ({key: value for key, value in PASS.items() if key != "minute"},)}, [], "event aa-1: no 'minute'"),
+    ({"events": ({**PASS, "type": 5},)}, [], "event aa-1: values in other places, or of another kind, than"),
     ({"pictures": [{"event_uuid": "aa-1", "freeze_frame": [{"location": [60.0, 40.0, 1.0]}]}]}, ["--event", "aa-1"],
      "event aa-1: location [60.0, 40.0, 1.0]; expected 2 numbers; export"),
     ({"pictures": [{"event_uuid": "aa-1", "freeze_frame": PEOPLE * 40}]}, ["--event", "aa-1"], "at most 60"),

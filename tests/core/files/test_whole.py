@@ -1,5 +1,6 @@
 """Files are written whole or not at all: through links, never over devices and pipes."""
 
+import errno
 import os
 import stat
 from pathlib import Path
@@ -8,7 +9,7 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.cli.main import main
-from beyond_mocap.files.atomic import atomic_folder, atomic_write
+from beyond_mocap.files.atomic import atomic_folder, atomic_path, atomic_write
 
 
 def test_a_link_stays_one_and_its_file_is_written(tmp_path):
@@ -29,6 +30,27 @@ def test_a_pipe_is_left_as_it_is(tmp_path, clip_file, capsys):
     assert "a device or a pipe" in capsys.readouterr().err
     assert stat.S_ISFIFO((tmp_path / "pipe.bvh").stat().st_mode)
     assert sorted(one.name for one in tmp_path.iterdir()) == ["clip.bvh", "clip.txt", "pipe.bvh"]
+
+
+def test_a_name_may_be_as_long_as_the_disk_allows(tmp_path):
+    name = "ä" * 127 + "b"
+    atomic_write(tmp_path / name, "text")
+    assert [one.name for one in tmp_path.iterdir()] == [name]
+    with pytest.raises(InputError, match="too long.; expected a name that the disk allows; choose a shorter"):
+        atomic_write(tmp_path / (name + "c"), "text")
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+@pytest.mark.parametrize("number, end", [
+    (errno.ENOSPC, "expected free space on its disk; make room, or choose another folder"),
+    (errno.EACCES, "expected a writable folder; choose another place"),
+])
+def test_why_a_file_cannot_be_written_decides_what_to_do(tmp_path, number, end):
+    for write in (atomic_path, atomic_folder):
+        with pytest.raises(InputError) as told, write(tmp_path / "out"):
+            raise OSError(number, os.strerror(number))
+        assert str(told.value) == f"{tmp_path / 'out'}: cannot be written ({os.strerror(number)}); {end}"
+        assert not list(tmp_path.iterdir())
 
 
 def test_what_a_killed_process_left_in_a_folder_is_in_nobodys_way(tmp_path):

@@ -364,6 +364,23 @@ def test_a_cache_that_cannot_be_written_is_told(folder, tmp_path):
     assert any("cannot be written" in note for note in library.notes)
 
 
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="Windows has no folders with the sticky bit")
+def test_what_only_another_user_may_replace_is_left_and_the_library_built_each_time(folder, monkeypatch):
+    """As in /tmp: all may write into the folder, but only its owner replaces a file."""
+    place = folder / CACHE_FOLDER
+    place.chmod(0o1777)
+    before = {path.name: path.stat().st_mtime_ns for path in place.iterdir()}
+    monkeypatch.setattr(os, "geteuid", lambda: os.stat(place).st_uid + 1)
+    (folder / "walk.txt").write_text("0 1 walking\n")
+    for _ in range(2):
+        library, worked = built(folder)
+        assert worked and [note for note in library.notes if "cannot be written: the library is rebuilt each" in note]
+    assert {path.name: path.stat().st_mtime_ns for path in place.glob("library*")} == {
+        name: time for name, time in before.items() if name.startswith("library")}
+    place.chmod(0o777)
+    assert built(folder)[1] and not built(folder)[1]
+
+
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a disk that is always full")
 def test_a_full_disk_is_told_in_one_line_and_leaves_no_half_of_a_cache(folder, monkeypatch):
     def open_full(path, mode="r", *more):

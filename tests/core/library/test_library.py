@@ -229,7 +229,7 @@ def test_a_key_moment_beyond_the_clip_is_told(tmp_path, clip_file):
     clip_file(tmp_path / "walk.bvh", 1.4, 2.0, "")
     (tmp_path / "walk.txt").unlink()
     (tmp_path / "annotations.csv").write_text(CSV + "walk.bvh,0,60,,walking\nwalk.bvh,30,99,80,kick right\n")
-    with pytest.raises(InputError, match=r"walk.*80.*0 to 60") as told:
+    with pytest.raises(InputError, match=r"annotations.csv:3: .* 80; expected frames 0 to 60 of walk") as told:
         build_library(tmp_path)
     one_line(told)
 

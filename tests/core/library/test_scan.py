@@ -12,8 +12,10 @@ from beyond_mocap.library.listing import scan_clips
 from beyond_mocap.library.scan import (
     Annotations,
     describe_misspelled_labels,
+    describe_unused_labels,
     find_clips,
     find_readable_clips,
+    find_recordings_and_labels,
     list_own_recordings,
 )
 
@@ -140,15 +142,64 @@ def test_the_nearest_table_that_speaks_of_a_clip_wins(folder):
     assert words(folder, "deep/a.BVH") == ["beside"]
 
 
+def describe_unused(folder):
+    recordings, labels = find_recordings_and_labels(folder)
+    annotations = Annotations(folder, recordings)
+    return describe_unused_labels(folder, recordings, labels, tables=annotations.tables,
+                                  used=annotations.list_sources(recordings))
+
+
 def test_rows_that_name_no_clip_are_told(folder):
     def told():
-        return Annotations(folder, find_clips(folder)).describe_unknown_files(folder)
+        return describe_unused(folder)
 
     (folder.parent / "annotations.csv").write_text(HEADER + row("other/a.bvh", "x") + row("library/b.bvh", "walking"))
     assert told() == []
     (folder / "annotations.csv").write_text(HEADER + row("gone.bvh", "x") * 2 + row("b.bvh", "walking"))
     (folder.parent / "annotations.csv").write_text(HEADER + row("library/gone.bvh", "x"))
     assert told() == ["annotations.csv: 3 rows name files that are not in the library, such as library/gone.bvh"]
+    (folder / "empty").mkdir()
+    (folder / "annotations.csv").unlink()
+    (folder.parent / "annotations.csv").unlink()
+    for names in (("a.bvh",), ("../b.bvh", "./c.bvh")):  # a table names what is below it
+        (folder / "empty" / "annotations.csv").write_text(HEADER + "".join(row(name, "x") for name in names))
+        (line,) = told()
+        assert line.endswith(f"not in the library, such as {names[0]} in empty/annotations.csv")
+    (folder / "empty" / "annotations.csv").write_text("a table of another kind")
+    (line,) = told()
+    assert "empty/annotations.csv:1: no column file" in line and line.endswith("below, so it is not used")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows has no named pipes")
+def test_what_has_the_name_of_labels_and_is_no_file_is_told_and_not_opened(folder):
+    (folder / "more.txt").mkdir()  # of no clip
+    os.mkfifo(folder / "lone.txt")
+    assert describe_unused(folder) == []
+    (folder / "b.txt").mkdir()
+    end = "so no labels are read from it; replace it by a file"
+    assert describe_unused(folder) == [f"b.txt: is a folder, {end}"]
+    (folder / "b.txt").rmdir()
+    (folder / "b.txt").symlink_to("nothing")
+    assert describe_unused(folder) == [f"b.txt: is a link to no file, {end}"]
+    os.mkfifo(folder.parent / "annotations.csv")
+    os.mkfifo(folder / "deep" / "annotations.csv")
+    (folder / "b.txt").unlink()
+    assert describe_unused(folder) == [
+        "deep/annotations.csv: is a device or a pipe, so no labels are read from it (similar in 2 places); "
+        "replace it by a file"]
+
+
+def test_rows_are_cut_to_their_clip_and_what_is_lost_is_told(tmp_path, clip_file):
+    clip_file(tmp_path / "walk.bvh", seconds=1.0, words="")
+    (tmp_path / "walk.txt").write_text("# labels\n0 1.1 walking\n")
+    library = build_library(tmp_path)
+    assert not [note for note in library.notes if "cut to" in note]
+    (tmp_path / "walk.txt").write_text("# labels\n0 100000 walking\n0 1.2 front\n")
+    lines = [note for note in build_library(tmp_path).notes if "cut to" in note]
+    assert lines == ["walk.txt:2: the row ends at frame 3000000, cut to the clip's last, 30 (similar in 2 rows)"]
+    (tmp_path / "walk.txt").write_text("# labels\n3 4 walking\n")
+    with pytest.raises(InputError, match=r"walk\.txt:2: a row that starts at frame 90; expected frames 0 to 30"):
+        build_library(tmp_path)
 
 
 def test_labels_that_are_probably_misspelled_are_named(folder):

@@ -109,6 +109,18 @@ def test_more_markers_than_said_are_reported(body, lines, read):
     assert "17 markers, not 16 as in the header" in read(lines).notes
 
 
+def test_a_file_that_ends_early_is_told_and_a_row_that_is_cut_off_left_out(body, lines, read):
+    early = "6 frames, not 12 as in the header: the file ends early"
+    cut = f"{early}, and its last row, which is cut off, is left out"
+    for end, note in (("", early), ("\n", early), ("\n" + lines[12][:40], cut), ("\n" + lines[12][:-1], cut)):
+        trial = read("\n".join(lines[:12]) + end)
+        assert [line for line in trial.notes if "header" in line] == [note]
+        np.testing.assert_allclose(trial.positions, body.positions[:6], atol=1e-7)
+    trial = read([*lines[:2], lines[2].replace("\t12\t", "\t999999999\t"), *lines[3:]])
+    assert same(trial, body) and "12 frames, not 999999999 as in the header: the file ends early" in trial.notes
+    assert not [line for line in read([*lines[:8], *lines[9:]]).notes if "early" in line]  # a gap is no end
+
+
 def test_frames_that_are_left_out_come_back_as_not_seen(body, lines, read):
     trial = read(lines[:10] + lines[13:])
     assert len(trial) == 12 and not trial.visibility[4:7].any() and trial.visibility[7:].all()
