@@ -1,18 +1,24 @@
-"""Files of pieces of work: JSON and arrays (never pickled) under a digest, so that altered files count as missing."""
+"""Files of pieces of work: JSON and arrays (never pickled) under a digest, so that altered files count as missing, and
+so do those whose content is not in the expected form.
+"""
 
 from __future__ import annotations
 
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ..base.digest import hex_digest
+from ..base.errors import InputError
 from .atomic import atomic_write
 
 _HEADER, _DIGEST = "header", "digest"
+
+Result = TypeVar("Result")
 
 
 def write_piece_file(path: Path, header: object, arrays: Mapping[str, np.ndarray]) -> None:
@@ -31,6 +37,43 @@ def write_piece_file(path: Path, header: object, arrays: Mapping[str, np.ndarray
     out = io.BytesIO()
     np.savez_compressed(out, **stored, **arrays)
     atomic_write(path, out.getvalue())
+
+
+def load_piece_file(path: Path, parse: Callable[[Any, dict[str, np.ndarray]], Result]) -> Result | None:
+    """Load a piece of work.
+
+    Args:
+        path: the file.
+        parse: makes the result of the header and the arrays by name; InputError where they are not in its form.
+    Returns:
+        The result; None if the file is missing, damaged or altered, or its content is in another form.
+    """
+    found = read_piece_file(path)
+    try:
+        return None if found is None else parse(*found)
+    except InputError:
+        return None
+
+
+def check_array(arrays: Mapping[str, np.ndarray], name: str, kind: type, shape: tuple[int | None, ...]) -> np.ndarray:
+    """Check that a piece has an array of finite numbers.
+
+    Args:
+        arrays: of the piece, by name.
+        name: of the array.
+        kind: number type that holds all of its numbers.
+        shape: None where any length is right.
+    Returns:
+        The array.
+    Raises:
+        InputError: if there is none of that type and shape, or a number is NaN or infinite.
+    """
+    values = arrays.get(name)
+    if values is None or values.ndim != len(shape) or not np.can_cast(values.dtype, kind) or not np.isfinite(
+            values).all() or any(count not in (None, size) for count, size in zip(shape, values.shape)):
+        found = "no such array" if values is None else f"{values.dtype} {values.shape}"
+        raise InputError(name, found, f"finite {np.dtype(kind)} {shape}")
+    return values
 
 
 def read_piece_file(path: Path) -> tuple | None:

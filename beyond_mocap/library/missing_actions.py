@@ -38,8 +38,8 @@ if TYPE_CHECKING:
 
 ACTION_PREFIX = "action_"
 _FOLDER = SYNTHETIC_FOLDER + ACTION_PREFIX
-_NAME = re.compile(r"(?P<name>\w+?)(_v(?P<speed>[\d.]+))?(_z(?P<height>[\d.]+))?(_b(?P<exit_speed>[\d.]+))?"
-                   r"(_d(?P<direction>[+-]\d+))?(_t(?P<seconds>[\d.]+))?(?P<side>_side)?\.bvh")
+_NAME = re.compile(r"(?P<name>\w+?)(_v(?P<speed>\d+\.\d))?(_z(?P<height>\d+\.\d))?(_b(?P<exit_speed>\d+\.\d))?"
+                   r"(_d(?P<direction>[+-]\d+))?(_t(?P<seconds>\d+\.\d))?(?P<side>_side)?\.bvh")
 _HEIGHT_SLACK = 0.15  # m by which the ball may be lower or higher than an action is built for
 _HEIGHT_STEP = 0.1  # m between the heights of the ball for which an action is built
 _FADE_SECONDS = 0.7  # s behind an action that can last: its fading shows neither it nor a gait, and has no labels
@@ -206,6 +206,26 @@ def add_actions(library: Library, paths: Iterable[str]) -> Library:
         clips = [clip for path in added for clip in _find_clips(library, path)]
         extended[added] = library.append_synthetic_clips(clips)
     return extended[added]
+
+
+def find_action_clip(library: Library, path: str) -> Clip | None:
+    """Find the synthetic clip of an action, not its mirrored twin.
+
+    Args:
+        library: the clips.
+        path: of the clip.
+    Returns:
+        The clip; None where no request is answered by a clip of that path.
+    """
+    if not path.startswith(_FOLDER):
+        return None
+    try:
+        action, numbers, sides = _parse_path(path)
+    except InputError:
+        return None
+    moment = ActionMoment(labels=sides, speed=numbers.get("speed", 0.0), height=numbers.get("height"),
+                          exit_speed=numbers.get("exit_speed"), seconds=numbers.get("seconds", 0.0))
+    return _find_clips(library.with_synthetic_clips, path)[0] if path in _name_clips(action, moment) else None
 
 
 def describe_action(path: str) -> str | None:

@@ -11,7 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from ...annotation.ball_contact import build_surfaces
-from ...files.piece_file import read_piece_file, write_piece_file
+from ...base.errors import InputError
+from ...files.json_values import check_list, check_numbers
+from ...files.piece_file import check_array, load_piece_file, write_piece_file
 from ...library.features import FPS
 from ...motion.motion import Motion
 from ...motion.track.ball_path import BallPath
@@ -23,7 +25,7 @@ from ..pieces.units import cut_plan
 from ..player_edit import PlayerEdit, Stretch
 from .capsules import compute_capsule_lines
 from .collision_avoidance import measure_overlap_depths, resolve_collisions
-from .correction import CURVES, Correction, apply_correction, join_corrections
+from .correction import CURVES, Correction, apply_correction, compute_knot_step, join_corrections
 from .spacing import compute_firmness
 
 MAX_SECONDS = 60.0
@@ -151,18 +153,48 @@ def save_parts(path: Path, parts: Sequence[PlayerCorrection]) -> None:
     write_piece_file(path, header, arrays)
 
 
-def load_parts(path: Path) -> tuple[PlayerCorrection, ...] | None:
-    """Load the results that `save_parts` wrote; None if there is no complete file."""
-    found = read_piece_file(path)
-    if found is None:
-        return None
-    header, arrays = found
-    return tuple(
-        PlayerCorrection(
-            correction=Correction(arrays[f"{number}.knots"], arrays[f"{number}.values"], fps, step),
-            before=before, **{name: arrays[f"{number}.{name}"] for name in _ARRAYS},
-        ) for number, (fps, step, before) in enumerate(header)
-    )  # fmt: skip
+def load_parts(path: Path, start: float, end: float, fps: float) -> tuple[PlayerCorrection, ...] | None:
+    """Load the results that `save_parts` wrote.
+
+    Args:
+        path: the file.
+        start: s of the window.
+        end: s of the window.
+        fps: frames per second.
+    Returns:
+        One result per player; None if there is no complete file of that form, or it is of another window.
+    """
+
+    def parse(header, arrays: dict[str, np.ndarray]) -> tuple[PlayerCorrection, ...]:
+        rows = [check_numbers(row, "header", 3, "[fps, step, m]") for row in check_list(header, "header")]
+        return tuple(_parse_part(row, {name: f"{number}.{name}" for name in (*_ARRAYS, "knots", "values")},
+                                 arrays, inside=(round(start * fps), round(end * fps)), fps=fps)
+                     for number, row in enumerate(rows))
+
+    return load_piece_file(path, parse)
+
+
+def _parse_part(row: tuple, names: dict[str, str], arrays: dict[str, np.ndarray], *, inside: tuple[int, int],
+                fps: float) -> PlayerCorrection:
+    """Parse one player's result; InputError if it is in another form, or of another window.
+
+    row: (fps, step, before); names: of the player's arrays; inside: frames of the window.
+    """
+    if row[:2] != (fps, compute_knot_step(fps)) or row[2] < 0.0:
+        raise InputError("header", f"{row}", f"{fps:g} frames per second, and a depth")
+    frames, led_frames, knots = (check_array(arrays, names[name], np.int64, (None,))
+                                 for name in ("frames", "led_frames", "knots"))
+    depth = check_array(arrays, names["depth"], np.float64, frames.shape)
+    led = check_array(arrays, names["led"], np.float64, (len(led_frames), 3))
+    values = check_array(arrays, names["values"], np.int16, (len(knots), CURVES))
+    margin = round(2.0 * MARGIN_SECONDS * fps)
+    for at, beyond in ((frames, 0), (led_frames, 0), (knots, margin)):
+        if np.any(at < inside[0] - beyond) or np.any(at >= inside[1] + beyond):
+            raise InputError("frames", "frames of another window", f"{inside[0]} to {inside[1]}")
+    if np.any(depth < 0.0):
+        raise InputError("depth", "a depth below 0", "m")
+    return PlayerCorrection(correction=Correction(knots, values, fps, int(row[1])), before=row[2], frames=frames,
+                            depth=depth, led_frames=led_frames, led=led)
 
 
 def _compute_firmness(take: Take) -> np.ndarray:

@@ -64,6 +64,9 @@ class NamedEdit:
         length: (R,) output frames.
         cut: (R,) bool, the run starts another piece; else it continues the run before.
         keys: in order of time.
+    Raises:
+        InputError: if the runs' arrays differ in length, a run has no frame, a number is NaN or infinite, or a clip is
+            not in the table.
     """
 
     clips: tuple[ClipName, ...]
@@ -77,6 +80,14 @@ class NamedEdit:
     def __post_init__(self):
         for name, kind in _FIELDS:
             object.__setattr__(self, name, freeze_array(getattr(self, name), kind))
+        shapes = {getattr(self, name).shape for name, _ in _FIELDS}
+        if shapes != {(self.clip.size,)} or np.any(self.length < 1):
+            raise InputError("edit list", f"runs of shape {', '.join(map(str, shapes))}", "(R,), a frame or more each")
+        if not (np.isfinite(self.first) & np.isfinite(self.rate)).all():
+            raise InputError("edit list", "NaN or infinite values", "finite numbers")
+        used = [self.clip.min(initial=0), self.clip.max(initial=-1), *(key.clip for key in self.keys)]
+        if min(used[0], *used[2:], 0) < 0 or max(used[1:]) >= len(self.clips):
+            raise InputError("edit list", "a clip that is not in the table", f"0 to {len(self.clips) - 1}")
 
     def __len__(self) -> int:
         return int(self.length.sum())

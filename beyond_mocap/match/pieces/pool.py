@@ -26,6 +26,7 @@ from typing import NoReturn
 from ...base.errors import BeyondMocapError, InputError, UserCancelledError
 from ...base.memory import read_peak_memory
 from ...base.optional_packages import import_optional
+from .interrupts import block_interrupts
 
 PIECES_PER_WORKER = 2
 """Pieces that each worker runs or has waiting: enough that none is idle, few enough to save memory."""
@@ -285,7 +286,8 @@ class _Processes:
                 env={name: "1" for name in _THREADS},
             )  # fmt: skip
             _Processes.shared_executor = self._executor
-        return self._executor.submit(run_task, work, arguments)
+        with block_interrupts():  # it may start processes
+            return self._executor.submit(run_task, work, arguments)
 
     def check(self, has_progress: bool) -> None:
         """Do nothing: the executor reports when a process ends."""

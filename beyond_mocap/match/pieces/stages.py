@@ -7,8 +7,9 @@ edit only affected pieces are computed again.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from ...annotation import Timeline
 from ...base.errors import BeyondMocapError, format_seconds
 from ...files.atomic import atomic_write
 from ...files.tables import to_plain
+from ...library.clip import Clip
 from ...motion.track.ball_path import BallPath
 from ..crowd.window import MARGIN_SECONDS, MAX_SECONDS, PlayerCorrection, cut_edit, join_windows, load_parts, save_parts
 from ..player_edit import PlayerEdit
@@ -25,10 +27,12 @@ from ..player_plans import PlayerPlans
 from .constructed_motion import ConstructedMotion
 from .job import Job, remove_library_paths, run_stage
 from .motion_parts import MotionSpan
+from .named_edit import ClipName
 from .pool import TaskFailure
+from .stored_piece import fits_window, list_library_clips, load_piece, save_piece
 from .tasks import FinishRequest, finish_player, resolve_collision_window, search_unit
 from .units import build_units
-from .windows import Piece, join_pieces, load_piece, save_piece
+from .windows import Piece, join_pieces
 
 SEARCH, CROWD = "search", "crowd"
 """The kinds of pieces that are stored, beside the constructed motion."""
@@ -88,10 +92,14 @@ class _PlayerSearch:
                     name = job.build_name(replace(unit, plan=replace(unit.plan, library="")))
                     self._names.add(name)
                     found = load_piece(job.folder.piece_path(SEARCH, name))
-                    if found is not None:
+                    if found is not None and fits_window(found, unit, self._clips, job.library):
                         self._add_piece(player, found)
                     else:
                         yield (player, name), (job.source, unit)
+
+    @cached_property
+    def _clips(self) -> dict[ClipName, Clip]:
+        return list_library_clips(self._job.library)
 
     def _add_piece(self, player: str, piece: Piece) -> None:
         """Add one window; the last one completes the player's edit list."""
@@ -138,10 +146,15 @@ def resolve_player_collisions(job: Job, motion: ConstructedMotion, span: tuple[f
     def find_file(number: int) -> Path:
         return job.folder.piece_path(CROWD, _name_window(job, motion.edits, *windows[number]))
 
+    def load_stored() -> Iterator[tuple[int, tuple[PlayerCorrection, ...] | None]]:
+        for number, window in enumerate(windows):
+            yield number, load_parts(find_file(number), *window, job.request.fps)
+
     while True:
         # names take seconds: where nothing is stored they are built beside the workers' results
         players, is_stored = list(motion.edits), job.folder.has_pieces(CROWD)
-        found = _load_windows(map(find_file, range(len(windows))), len(players)) if is_stored else {}
+        found = {number: parts for number, parts in (load_stored() if is_stored else ())
+                 if parts is not None and len(parts) == len(players)}
         if motion.construct(_widen(*window) for number, window in enumerate(windows) if number not in found):
             break
     if not players:
@@ -173,12 +186,6 @@ def _name_window(job: Job, edits: dict[str, PlayerEdit], start: float, end: floa
     """Name a window by all that its result depends on."""
     cut = tuple(cut_edit(edit, *_widen(start, end)) for edit in edits.values())
     return job.build_name(start, end, remove_library_paths(cut))
-
-
-def _load_windows(files: Iterable[Path], count: int) -> dict[int, tuple[PlayerCorrection, ...]]:
-    """Load the results of the windows that are stored, by number; count: of players."""
-    loaded = ((number, load_parts(file)) for number, file in enumerate(files))
-    return {number: parts for number, parts in loaded if parts is not None and len(parts) == count}
 
 
 def _build_windows(span: tuple[float, float], window: float, fps: float) -> list[tuple[float, float]]:

@@ -1,5 +1,5 @@
-"""The result of the search for one window: which clip is used when, no motion yet. It is found, saved in a file (never
-pickled), and joined into one edit list.
+"""The result of the search for one window: which clip is used when, no motion yet. It is found, saved in a file
+(`stored_piece`), and joined into one edit list.
 
 Windows are joined where two neighbours use the same frame of the same clip, so that the joint is invisible; otherwise
 at the transition with the lowest cost in the overlap.
@@ -9,13 +9,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...base.errors import InputError, TimedMessage, line_spans
-from ...files.piece_file import read_piece_file, write_piece_file
+from ...base.errors import InputError
 from ...library.automatic_locomotion import apply_chosen_gaits
 from ...library.features import FPS
 from ...library.library import Library
@@ -45,8 +43,6 @@ from .named_edit import (
 )
 from .units import Unit, cut_plan
 
-_ARRAYS = ("clip", "first", "rate", "length", "cut")
-_PLAIN = ("player", "stretch", "number", "first", "own", "seconds")
 _MIN_SEAM_DISTANCE = 4
 """Frames between a joint and other transitions, so that it can be blended."""
 
@@ -123,27 +119,6 @@ def build_search_library(library: Library, plan: ResolvedPlan, used: Iterable[st
         return apply_chosen_gaits(library, gaits)
     actions = find_plan_actions(library, plan)
     return apply_chosen_gaits(add_actions(library.with_synthetic_clips, [*actions, *used]), gaits)
-
-
-def save_piece(path: Path, piece: Piece) -> None:
-    """Save a piece; InputError if it cannot be written."""
-    header = {name: getattr(piece, name) for name in _PLAIN}
-    header |= {"hurried": piece.hurried_from, "warnings": [[str(line), line_spans(line)] for line in piece.warnings]}
-    header |= {"clips": piece.edit.clips, "keys": [asdict(key) for key in piece.edit.keys]}
-    write_piece_file(path, header, {name: getattr(piece.edit, name) for name in _ARRAYS})
-
-
-def load_piece(path: Path) -> Piece | None:
-    """Load the piece that `save_piece` wrote; None if there is no complete file."""
-    found = read_piece_file(path)
-    if found is None:
-        return None
-    header, arrays = found
-    keys = tuple(NamedKey(**{**key, "words": tuple(key["words"])}) for key in header.pop("keys"))
-    clips = tuple((path, mirrored) for path, mirrored in header.pop("clips"))
-    warnings = tuple(TimedMessage(text, *spans) for text, spans in header["warnings"])
-    header |= {"own": tuple(header["own"]), "warnings": warnings, "hurried_from": header.pop("hurried")}
-    return Piece(edit=NamedEdit(clips=clips, **arrays, keys=keys), **header)
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,9 @@ def deadly(number, folder, times):
         os.kill(os.getpid(), signal.SIGKILL)
     return number, os.getpid()
 
+def blocks(number):
+    return signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+
 def slow(seconds):
     time.sleep(seconds)
     return os.getpid()

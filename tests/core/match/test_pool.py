@@ -9,6 +9,7 @@ import pytest
 
 from beyond_mocap.base.errors import InputError, UserCancelledError
 from beyond_mocap.match.pieces import pool
+from beyond_mocap.match.pieces.interrupts import block_interrupts
 from beyond_mocap.match.pieces.pool import TaskFailure, WorkerConfig, run_tasks, start_workers
 
 
@@ -33,6 +34,22 @@ def test_offline_only_this_machine_is_asked(monkeypatch, address, local):
     if not local:
         with pytest.raises(InputError, match="another machine, and Blender is offline.*Allow Online Access"):
             pool.check_workers(WorkerConfig(1, address))
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="the system has no such masks")
+def test_ctrl_c_does_not_reach_processes_that_are_being_started(chores):
+    """They are started by a thread here; what comes in the meantime reaches this process afterwards."""
+    pool.stop_workers()
+    found = []
+    thread = threading.Thread(target=lambda: found.extend(run_tasks(numbers(2), chores.blocks, WorkerConfig(2))))
+    thread.start()
+    thread.join(120.0)
+    assert sorted(found) == [(0, True), (1, True)]
+    arrived = False
+    with pytest.raises(KeyboardInterrupt), block_interrupts():
+        signal.pthread_kill(threading.get_ident(), signal.SIGINT)
+        arrived = True
+    assert arrived and signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
 
 
 @pytest.mark.parametrize("workers", [1, 2])

@@ -21,8 +21,11 @@ from beyond_mocap.library.missing_actions import (
     add_actions,
     describe_action,
     find_action,
+    find_action_clip,
+    find_action_paths,
     find_missing_actions,
     is_action_clip,
+    list_action_labels,
     select_own_kicks,
 )
 from beyond_mocap.library.scan import CACHE_FOLDER
@@ -62,6 +65,18 @@ def test_a_clip_is_read_by_other_processes_as_it_was_built(library, tmp_path, mo
             assert np.array_equal(values(one), values(other)) and values(one).dtype == values(other).dtype
     with pytest.raises(TypeError):  # a cache of other recordings is not read
         add_actions(replace(kept, cache_location=(tmp_path, "other")), paths)
+
+
+def test_a_clip_of_an_action_is_found_where_a_request_names_it(library, monkeypatch):
+    monkeypatch.setattr(missing_actions, "_find_clips", lambda library, path: (path, None))
+    situations = [{"speed": speed, "height": height, "exit_speed": exit_speed, "seconds": seconds}
+                  for speed, height, exit_speed, seconds in ((0.0, None, None, 0.0), (2.3, 0.15, 9.0, 3.3),
+                                                             (5.1, 0.32, None, 99.0), (9.9, 2.5, 40.0, 0.0))]
+    paths = {path for is_span in (False, True) for labels in list_action_labels(is_span) for situation in situations
+             for path in find_action_paths(ActionMoment(labels=labels, is_span=is_span, **situation))}
+    assert len(paths) > 200 and all(find_action_clip(library, path) == path for path in paths)
+    for path in (HEADER[0], *sorted(paths)[:3]):
+        assert find_action_clip(library, path.replace(".bvh", "_v77.7.bvh")) is None
 
 
 def test_a_library_is_extended_as_if_it_were_indexed_as_a_whole(library):
