@@ -162,9 +162,9 @@ def _describe_order(comparison: MethodComparison, title: str, read: Read, form: 
 HANDICAPS = {
     "path": "`path` alone may add synthetic clips where recordings lack a speed or an action, plants the feet and "
             "brings the body to the ball; it plays clips a little faster or slower. Its distance is small by "
-            "construction. Its automatic locomotion changes gait where the labels of its clips do, that of the others "
-            "a quarter of the way between the gaits' speeds, as in the thesis; equation 18 measures each against its "
-            "own.",
+            "construction, and labels whose recordings are too slow for the track are not shown. Its automatic "
+            "locomotion changes gait where the labels of its clips do, that of the others a quarter of the way between "
+            "the gaits' speeds, as in the thesis; equation 18 measures each against its own.",
     "distance": "`distance` keeps the track's length, not its time: it is off where actions lose or gain distance, "
                 "plays clips as much faster or slower as it needs to catch up, and its feet are not planted.",
     NO_CATCH_UP: f"`{NO_CATCH_UP}` is `distance` as the thesis measured it: lost distance is never regained.",
