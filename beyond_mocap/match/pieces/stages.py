@@ -7,7 +7,7 @@ edit only affected pieces are computed again.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -146,24 +146,19 @@ def resolve_player_collisions(job: Job, motion: ConstructedMotion, span: tuple[f
     def find_file(number: int) -> Path:
         return job.folder.piece_path(CROWD, _name_window(job, motion.edits, *windows[number]))
 
-    def load_stored() -> Iterator[tuple[int, tuple[PlayerCorrection, ...] | None]]:
-        for number, window in enumerate(windows):
-            yield number, load_parts(find_file(number), *window, job.request.fps)
-
     while True:
         # names take seconds: where nothing is stored they are built beside the workers' results
         players, is_stored = list(motion.edits), job.folder.has_pieces(CROWD)
-        found = {number: parts for number, parts in (load_stored() if is_stored else ())
-                 if parts is not None and len(parts) == len(players)}
+        files = {number: find_file(number) for number in range(len(windows))} if is_stored else {}
+        found = _load_windows(files, windows, job.request.fps, len(players))
         if motion.construct(_widen(*window) for number, window in enumerate(windows) if number not in found):
             break
     if not players:
         return {}
     tasks = ((number, (job.source, [motion.find_spans(player, *_widen(*window)) for player in players], *window))
              for number, window in enumerate(windows) if number not in found)
-    files = {number: find_file(number) for number in found}
     for number, result in run_stage(job, tasks, resolve_collision_window, CROWD):
-        files[number] = find_file(number)
+        files[number] = files.get(number) or find_file(number)
         if isinstance(result, TaskFailure):
             start, end = windows[number]
             when = f"{format_seconds(start)}-{format_seconds(end)} s"
@@ -186,6 +181,13 @@ def _name_window(job: Job, edits: dict[str, PlayerEdit], start: float, end: floa
     """Name a window by all that its result depends on."""
     cut = tuple(cut_edit(edit, *_widen(start, end)) for edit in edits.values())
     return job.build_name(start, end, remove_library_paths(cut))
+
+
+def _load_windows(files: Mapping[int, Path], windows: Sequence[tuple[float, float]], fps: float,
+                  count: int) -> dict[int, tuple[PlayerCorrection, ...]]:
+    """Load the results of the windows that are stored, by number; count: of players."""
+    loaded = ((number, load_parts(file, *windows[number], fps)) for number, file in files.items())
+    return {number: parts for number, parts in loaded if parts is not None and len(parts) == count}
 
 
 def _build_windows(span: tuple[float, float], window: float, fps: float) -> list[tuple[float, float]]:
