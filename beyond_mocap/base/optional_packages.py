@@ -14,6 +14,7 @@ EXTRAS = {
 }  # fmt: skip
 """Extra of pyproject.toml -> the packages that the code imports from it."""
 _EXTRA_OF = {package: extra for extra, packages in EXTRAS.items() for package in packages}
+_WARNING_PACKAGES = ("matplotlib",)  # it warns in three lines where no home folder is found
 
 
 def import_optional(name: str, where: object) -> ModuleType:
@@ -29,7 +30,8 @@ def import_optional(name: str, where: object) -> ModuleType:
     """
     package = name.partition(".")[0]
     extra = _EXTRA_OF[package]
-    logging.getLogger(package).setLevel(logging.ERROR)  # Matplotlib warns in three lines of a home that is missing
+    if package in _WARNING_PACKAGES:
+        logging.getLogger(package).setLevel(logging.ERROR)
     try:
         return import_module(name)
     except ImportError as error:

@@ -175,7 +175,8 @@ def check_outputs(*paths: Path | None, reserved: tuple[Path | None, ...] = (), l
     is_any_there = any(path.is_file() for path in filter(None, paths))
     recorded = _identify_library_files(library) if library is not None and is_any_there else set()
     for path in filter(None, paths):
-        folder = path.resolve().parent  # a link is written where it leads
+        resolved = path.resolve()  # a link is written where it leads
+        folder = resolved.parent
         if path.is_dir():
             raise InputError(path, "is a folder", "a file", "add a file name")
         if path.exists() and not path.is_file():
@@ -184,10 +185,10 @@ def check_outputs(*paths: Path | None, reserved: tuple[Path | None, ...] = (), l
             raise InputError(path, "its folder does not exist", "an existing folder", "create the folder first")
         if not os.access(folder, os.W_OK | os.X_OK):
             raise InputError(path, "its folder is not writable", "a writable folder", "choose another folder")
-        if path.resolve() in used:
+        if resolved in used:
             problem = "is both an output and another file of the command"
             raise InputError(path, problem, "different files", "rename one of them")
-        used.add(path.resolve())
+        used.add(resolved)
         if recorded and path.exists() and identify_file(path) in recorded:
             raise InputError(path, f"is a file of the library {library}", "another file", "choose another name")
 

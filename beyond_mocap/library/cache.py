@@ -163,7 +163,7 @@ def create_arrays_folder(place: Path, name: str = "library") -> Iterator[Path]:
 
 
 def _belongs_to_another(file: Path) -> bool:
-    """Tell whether only another user may replace a file: in a folder with the sticky bit, as /tmp has it."""
+    """Return whether only another user may replace a file: in a folder with the sticky bit, as /tmp has it."""
     if not hasattr(os, "geteuid") or not os.path.lexists(file):
         return False
     folder = file.parent.stat()

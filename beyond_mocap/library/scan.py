@@ -262,7 +262,7 @@ def _describe_unknown_files(folder: Path, recordings: Sequence[Path], tables: Ta
 
 
 def _concerns_library(place: str, name: str, top: str) -> bool:
-    """Tell whether a row of the table in `place` has to name a recording below `top`."""
+    """Return whether a row of the table in `place` has to name a recording below `top`."""
     return os.path.join(place, "").startswith(top) or os.path.normpath(os.path.join(place, name)).startswith(top)
 
 

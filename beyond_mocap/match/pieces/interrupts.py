@@ -1,7 +1,7 @@
 """Keep a terminal's Ctrl-C from processes that are being started.
 
-A terminal sends it to all processes of a command. One that is still loading Python would print a traceback: what it is
-told to do about signals comes later.
+A terminal sends it to all processes of a command. One that is still loading Python would print a traceback: it
+sets what signals do only later.
 """
 
 from __future__ import annotations
