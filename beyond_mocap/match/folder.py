@@ -214,6 +214,17 @@ def check_folder(path: Path) -> None:
         other = next((one.name for one in sorted(path.iterdir()) if one.name != LABELS_FOLDER), None)
         if other is not None:
             raise InputError(path, f"holds other files ({other})", "an empty or a new folder", "choose another folder")
+    _check_kinds(path)
+
+
+def _check_kinds(folder: Path) -> None:
+    """Check that what stands where a match keeps its state and its folders is a file or a folder as it should be."""
+    step = "remove it, or choose another folder for the match"
+    if (folder / STATE).is_dir():
+        raise InputError(folder / STATE, "is a folder", "the state of a match", step)
+    for path in (folder / _WORK, folder / LABELS_FOLDER):
+        if path.exists() and not path.is_dir():
+            raise InputError(path, describe_no_folder(path), "a folder", step)
 
 
 def _check_identity(path: Path, before: dict, identity: Mapping[str, object]) -> None:

@@ -17,6 +17,8 @@ _WIDTH = DEGREE + 1
 _PIECES_PER_STIFFNESS = 4  # pieces within a length of `stiff`
 _ROUNDS = 8
 _PULL_RANGE = 0.5  # share of `stiff` over which a value pulls its neighbours along
+_STIFFEST = 10.0
+"""Domains: from there on a spline has no roughness, and what is stiffer loses the fit in rounding (0.5 m at 50)."""
 _FREE_SHARE = 0.7  # share of the slack beyond which values pull more
 SLACK = 0.06
 """Metres that the path may be off the pelvis."""
@@ -56,6 +58,7 @@ def fit_smoothing_spline(
     values = np.asarray(values, dtype=float)
     origin = values.mean(axis=0)  # keeps precision far from the origin
     basis, left = _evaluate_basis(at, knots)
+    stiff = min(stiff, _STIFFEST * (high - low))
     weights = np.full(len(at), 1.0 / len(at)) if weights is None else weights / len(at)
     roughness, roughness_weights = _build_roughness(knots, order, stiff ** (2 * order) / (high - low))
     count = pieces if closed else pieces + DEGREE

@@ -155,7 +155,12 @@ def test_folders_that_are_none_of_a_match_are_told(order, tmp_path):
     (tmp_path / "file").write_text("x")
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "thesis.txt").write_text("x")
+    (tmp_path / "state" / "match.json").mkdir(parents=True)
+    (tmp_path / "work").mkdir()
+    (tmp_path / "work" / ".work").write_text("x")
     for path, told in ((tmp_path / "file", "is a file"), (tmp_path / "full", r"holds other files \(thesis.txt\)"),
+                       (tmp_path / "state", r"match\.json: is a folder.*remove it"),
+                       (tmp_path / "work", r"\.work: is a file.*remove it"),
                        (tmp_path / "no" / "where", "the folder above it does not exist")):  # fmt: skip
         with pytest.raises(InputError, match=told):
             with open_folder(path, known):

@@ -58,3 +58,10 @@ def test_within_a_slack():
     corner = np.abs(AT - 3.0)[:, None] * [4.0, 0.0]
     knots, coefficients = fit_spline_within(corner, AT, 40, 0.5, 0.05)
     assert np.linalg.norm(BSpline(knots, coefficients, 3)(AT) - corner, axis=1).max() < 0.06
+
+
+def test_samples_much_closer_than_the_stiffness():
+    """Three samples in 2 ms of a path that is smoothed over 0.4 s: the parabola through them, not a singular matrix."""
+    at, values = np.array([0.0, 0.001, 0.002]), np.array([[0.0, 1.0], [1.0, 0.0], [0.0, 3.0]])
+    knots, coefficients = fit_smoothing_spline(values, at, 4, 0.4, order=3)
+    assert BSpline(knots, coefficients, 3)(at) == pytest.approx(values, abs=1e-4)
