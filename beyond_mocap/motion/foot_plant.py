@@ -49,6 +49,9 @@ be as straight."""
 MIN_EASE_DISTANCE, MIN_RESERVE = 0.003, 0.002
 """The same of legs that were straight in the recording."""
 
+TRIM_SECONDS = 0.1
+"""Seconds by which a foot may land later, or leave earlier, than recorded."""
+
 _RELAX_ROUNDS, _SLIDE_TOLERANCE = 3, 0.004  # rounds of relaxing the contact weights; metres of sliding that need none
 _SPREAD_FRAMES = 3  # frames at 30 per second over which a rise or drop is spread
 
@@ -167,7 +170,9 @@ def plant_feet(
         short = [measure_shortfall(foot, goal, drop) for foot, (goal, _) in zip(feet, goals)]
         if attempt == _RELAX_ROUNDS or max(s.max(initial=0.0) for s in short) <= _SLIDE_TOLERANCE:
             break
-        relaxed = [relax_contact_weights(weight, s) for weight, s in zip(weights, short)]
+        trimmed = [trim_stances(weight, foot.contact_weight > 0.0, s, fps)
+                   for weight, foot, s in zip(weights, feet, short)]
+        relaxed = [relax_contact_weights(weight, s) for weight, s in zip(trimmed, short)]
         is_new = [not np.array_equal(weight, before) for weight, before in zip(relaxed, weights)]
         weights = relaxed
     root = root - drop[:, None] * [0.0, 0.0, 1.0]
@@ -287,6 +292,30 @@ def solve_limited_shift(
         weight = relax_contact_weights(weight, far - max_shift)
         ground = solve_shift(velocity, weight, scale)
     return ground, weight
+
+
+def trim_stances(weight: np.ndarray, planted: np.ndarray, short: np.ndarray, fps: float) -> np.ndarray:
+    """Trim the weights (T, 2) of stances at the ends that a leg does not reach, so that the rest of them holds.
+
+    The foot lands up to TRIM_SECONDS later or leaves as much earlier, at most by a quarter of the stance at each end. Without
+    this, two frames at its ends would make a whole stance slide.
+
+    Args:
+        weight: (T, 2) contact weights.
+        planted: (T,) bool, frames of stances.
+        short: (T,) m that the leg is too short.
+        fps: frames per second.
+    """
+    weight = weight.copy()
+    for first, end in find_runs(planted):
+        most = min(int(round(TRIM_SECONDS * fps)), (end - first) // 4)
+        late = np.flatnonzero(short[first : first + most] > _SLIDE_TOLERANCE)
+        early = np.flatnonzero(short[end - most : end] > _SLIDE_TOLERANCE)
+        if len(late):
+            weight[first : first + late[-1] + 1] = 0.0
+        if len(early):
+            weight[end - most + early[0] : end] = 0.0
+    return weight
 
 
 def relax_contact_weights(weight: np.ndarray, excess: np.ndarray) -> np.ndarray:

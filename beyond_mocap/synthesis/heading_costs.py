@@ -25,6 +25,7 @@ BALL_COST = 1.0  # per radian beyond it, half of that from 3 m/s on
 PULL_COST = 0.02  # per radian to the ball, also within: where all cost alike, an edit far away would choose more often
 TRAVEL_COST = 6.0  # per radian beyond TRAVEL_LIMITS
 FORWARD_COST = 0.3  # per radian to travel and m/s above 0.6: forward is cheaper
+ALONE_COST = 1.0  # the same without a ball, up to 1.6 m/s: who has nothing to watch turns and walks back forward
 SIDEWAYS_COST, SIDEWAYS_WIDTH = 2.5, np.radians(45.0)  # at a right angle to travel, and the width of that bell
 TURN_COST, TURN_RATE_COST, TURN_ANGLE_COST = 0.12, 0.08, 0.7  # per second of turning, per (pi / s)^2, per radian
 GIVEN_COST = 40.0  # per radian and second: given headings hold against all others
@@ -163,6 +164,8 @@ def _compute_heading_costs(bearings: _Bearings, is_keeper: bool) -> np.ndarray:
     limits = np.interp(v, _KEEPER_SPEEDS if is_keeper else _TRAVEL_SPEEDS, _TRAVEL_LIMITS)
     cost += TRAVEL_COST * np.maximum(from_travel - limits, 0.0)
     cost += FORWARD_COST * np.clip(v - 0.6, 0.0, 3.0) * from_travel
+    alone = np.isnan(bearings.ball)[:, None]
+    cost += alone * ALONE_COST * np.clip(v - 0.6, 0.0, 1.0) * from_travel
     bell = np.exp(-(((from_travel - np.pi / 2.0) / SIDEWAYS_WIDTH) ** 2))
     sideways = SIDEWAYS_COST * (KEEPER_SIDEWAYS if is_keeper else 1.0)
     cost += sideways * bell * np.clip((v - 0.5) / 0.7, 0.0, 1.0)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from beyond_mocap.base.time_series import find_runs
 from beyond_mocap.motion import contacts
 from beyond_mocap.motion.foot_plant import MAX_DROP, plant_feet, solve_shift
 from beyond_mocap.motion.humanoid import identify_joints, measure_leg_length
@@ -95,6 +96,17 @@ def test_a_heel_rises_before_the_pelvis_sinks(walk):
     assert np.median(np.abs(up[..., 1][behind])) < 0.006 and out.miss.max() < 0.005
     assert np.percentile((up[..., 0] - low[..., 0])[behind], 90) > 0.02
     assert (root[:, 2] - out.root[:, 2]).max() <= MAX_DROP + 1e-9
+
+
+def test_a_stance_holds_though_its_end_is_out_of_reach(walk):
+    """As where two clips join in the middle of a stance: the body goes ahead by 0.28 m, and the foot leaves earlier."""
+    motion, stands = walk
+    first, end = find_runs(stands[:, 1].any(axis=1))[2]
+    through = np.clip((np.arange(len(motion)) - 0.5 * (first + end)) / 8.0 + 0.5, 0.0, 1.0)
+    root, out = planted(motion, stands, np.outer(0.28 * through**2 * (3.0 - 2.0 * through), (1.0, 0.0, 0.0)))
+    toe = feet_of(motion, out.root, out.rotations)[first:end, 1, 1, 0]
+    assert np.ptp(toe[1:-3]) < 0.005 < np.ptp(toe)
+    assert out.miss[first:end, 1].max() < 0.005
 
 
 def test_a_foot_in_the_air_need_not_be_reached(walk):
