@@ -23,6 +23,7 @@ from ..motion.track.ball_path import BallPath
 from .atomic import atomic_write
 
 BALL_COLUMNS = ("time_s", "x_m", "y_m", "z_m", "measured")
+_MAX_BYTES = 2_000_000_000  # bytes of a file
 _MAX_METRES = 1e4  # metres; larger coordinates are in a wrong unit
 _SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", ":": "colons", " ": "spaces"}
 _WITH_COMMA = re.compile(r"^([+-]?\d*),(\d*(?:[eE][+-]?\d+)?)$")
@@ -178,7 +179,7 @@ def parse_number(text: str, name: str, place: str, blank: bool = False) -> float
 
 
 def _read_text(path: str | os.PathLike) -> str:
-    data = read_bytes(path, "a CSV file")
+    data = read_bytes(path, "a CSV file", _MAX_BYTES)
     if not data.strip():
         raise InputError(path, "the file is empty", "a CSV file with a header", "export it again")
     try:

@@ -38,6 +38,7 @@ _CENTRE_NAMES = {
     "neck": ("neck", "neck1", "neck01", "necklower", "necktwist01", "lowerneck"),
     "head": ("head",),
 }
+_MIN_LEG = 1e-3  # m of thigh and shank
 _PREFIX = re.compile(r"^(mixamorig\d*|valvebiped|j_bip|cc_base|bip\d+|joint|def|org|b)[_\-. ]+(c_)?", re.I)
 _PARTS = {name for names in _LIMB_NAMES.values() for name in names}
 
@@ -177,7 +178,9 @@ def identify_posed_joints(motion: Motion) -> Humanoid:
         frames = np.unique(np.linspace(0, len(motion) - 1, 64).astype(int))
         roles = _choose_roles(_find_structural_roles(skeleton, motion.root_positions[frames], motion.rotations[frames]),
                               roles)
-    return build_humanoid(skeleton.names, skeleton.parents, roles)
+    body = build_humanoid(skeleton.names, skeleton.parents, roles)
+    _check_legs(skeleton.names, skeleton.offsets, body)
+    return body
 
 
 @lru_cache(maxsize=256)
@@ -189,7 +192,17 @@ def _identify_from_arrays(names: tuple[str, ...], parents: tuple[int, ...], offs
         skeleton = Skeleton(names, parents, np.frombuffer(offsets).reshape(-1, 3), tips[0], ends)
         roles = _choose_roles(_find_structural_roles(skeleton, np.zeros((1, 3)), quaternion.identity(1, len(names))),
                               roles)
-    return build_humanoid(names, parents, roles)
+    body = build_humanoid(names, parents, roles)
+    _check_legs(names, np.frombuffer(offsets).reshape(-1, 3), body)
+    return body
+
+
+def _check_legs(names: tuple[str, ...], offsets: np.ndarray, body: Humanoid) -> None:
+    """Check that legs have a length, by which motions are scaled; offsets (J, 3) m; InputError otherwise."""
+    for limb in (body.left, body.right):
+        if not np.linalg.norm(offsets[[limb.lower_leg, limb.foot]], axis=1).sum() >= _MIN_LEG:
+            raise InputError("skeleton", f"no length from {names[limb.upper_leg]} to {names[limb.foot]}",
+                             "legs with a length", "correct their OFFSETs, or the unit")  # fmt: skip
 
 
 def _find_structural_roles(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray) -> dict[str, int] | None:

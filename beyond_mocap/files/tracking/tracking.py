@@ -11,6 +11,7 @@ import hashlib
 import io
 import os
 import re
+from array import array
 from dataclasses import replace
 from pathlib import Path
 
@@ -44,6 +45,7 @@ from .referees import describe_referee, read_referee_samples, read_team_colours
 RATES = (5.0, 100.0)
 """Smallest and largest sampling rate of a track, samples per second."""
 
+_PLAYER = ("time_s", "x_m", "y_m")
 _BALL = ("ball_x_m", "ball_y_m", "ball_z_m")
 _CACHE_VERSION = 5
 _CACHE_BYTES = 4_000_000_000  # of all matches in the cache, some 40
@@ -66,31 +68,28 @@ def read_track_csv(path: str | os.PathLike) -> Track:
         InputError: with the line, for missing columns (also one of the ball's two on the ground), cells that are
             not numbers or beyond 10 km, fewer than two samples with a position, and rates outside 5 to 100 Hz.
     """
-    rows = list(read_rows(path, ("time_s", "x_m", "y_m")))
-    names = rows[0][1] if rows else {}
-    player = _parse_cells(rows, ("time_s", "x_m", "y_m"))
-    ball = np.full((len(rows), 3), np.nan)
-    if "ball_x_m" in names or "ball_y_m" in names:
-        _check_ball_columns(names, path)
-        ball = _parse_cells(rows, [name for name in _BALL if name in names])
-        ball = np.pad(ball, ((0, 0), (0, 3 - ball.shape[1])), constant_values=np.nan)
+    cells, names = array("d"), ()
+    for place, row in read_rows(path, _PLAYER):  # no rows are kept: a dict of one takes as much as a hundred numbers
+        if not names:
+            names = _PLAYER + _find_ball_columns(row, path)
+        cells.extend(parse_number(row[name], name, place, blank=True) for name in names)
+    names = names or _PLAYER
+    values = np.array(cells).reshape(-1, len(names))
+    player, ball = values[:, :3], np.full((len(values), 3), np.nan)
+    ball[:, : len(names) - 3] = values[:, 3:]
     track = Track(player[:, 0], player[:, 1:], ball, name=Path(path).name)
     _check_rate(track, path)
     return track
 
 
-def _check_ball_columns(names, path) -> None:
-    """Raise an error where a column names one coordinate of the ball's place on the ground and none the other."""
-    lacking = [name for name in _BALL[:2] if name not in names]
-    if lacking:
+def _find_ball_columns(names, path) -> tuple[str, ...]:
+    """Find the ball's columns: none, or both on the ground and perhaps its height; InputError for one of both."""
+    found = tuple(name for name in _BALL if name in names)
+    lacking = [name for name in _BALL[:2] if name not in found]
+    if len(lacking) == 1:
         raise InputError(path, f"no column {lacking[0]!r}", "both of 'ball_x_m' and 'ball_y_m', or neither",
                          f"add {lacking[0]!r}, or rename the other")
-
-
-def _parse_cells(rows, names) -> np.ndarray:
-    """Parse some columns to (N, k) numbers, NaN for blank cells."""
-    cells = [[parse_number(row[name], name, place, blank=True) for name in names] for place, row in rows]
-    return np.array(cells, dtype=float).reshape(len(rows), len(names))
+    return () if lacking else found
 
 
 def _check_rate(track: Track, path) -> None:

@@ -20,6 +20,7 @@ _COAST_EXACT = 0.012  # metres: a coasting feed keeps to its line up to rounding
 # noise of s metres along both axes puts a sample 1.22 s off its neighbours' line, and a step 1.5 s off the usual one,
 # along each axis; five times that is passed once in 300 000 samples
 _SPIKE_NOISE, _JUMP_NOISE = 6.1, 7.5
+_BLOCK = 16384  # windows of which medians are found at a time: 90 minutes at 100 Hz would take a gigabyte
 _STRAY = 2  # samples before a jump at the track's start, or after one at its end, that are taken for strays
 SNAP_LIMIT = 3.0
 """Metres: a longer step is another player, or real; it is reported, not repaired."""
@@ -39,24 +40,24 @@ def detect_outliers(times: np.ndarray, positions: np.ndarray,
     """
     wrong = _detect_spikes(times, positions, noise)
     left = np.flatnonzero(~wrong)
-    jumps, excess = _detect_jumps(times[left], positions[left], noise)
+    times, positions = times[left], positions[left]
+    jumps, excess = _detect_jumps(times, positions, noise)
     too_far, used = [], set()
     for place, jump in enumerate(jumps):
         if jump in used:
             continue
         # a jump with a return is an excursion, one near an end a stray, a very long one is only reported, any other is
         # a snap after coasting
-        back = _find_return_jump(times[left], jumps, excess, place)
+        back = _find_return_jump(times, jumps, excess, place)
         if back is not None:
             used.add(back)
             wrong[left[jump + 1 : back + 1]] = True
         elif min(jump + 1, len(left) - 1 - jump) <= _STRAY:
             wrong[left[: jump + 1] if jump < _STRAY else left[jump + 1 :]] = True
         elif np.linalg.norm(excess[place]) > SNAP_LIMIT:
-            too_far.append(float(times[left[jump + 1]]))
+            too_far.append(float(times[jump + 1]))
         else:
-            wrong[left[_find_coasted_samples(times[left], positions[left], jump,
-                                             float(np.linalg.norm(excess[place])))]] = True
+            wrong[left[_find_coasted_samples(times, positions, jump, float(np.linalg.norm(excess[place])))]] = True
     return wrong, tuple(too_far)
 
 
@@ -113,7 +114,9 @@ def _detect_jumps(times: np.ndarray, positions: np.ndarray, noise: float) -> tup
     velocity = np.diff(positions, axis=0) / steps[:, None]
     half = int(max(3, round(0.3 / np.median(steps))))
     padded = np.pad(velocity, ((half, half), (0, 0)), mode="reflect" if half < len(steps) else "edge")
-    usual = np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1, axis=0), axis=2)
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * half + 1, axis=0)
+    usual = np.concatenate([np.median(windows[first : first + _BLOCK], axis=2)
+                            for first in range(0, len(windows), _BLOCK)])
     excess = (velocity - usual) * steps[:, None]
     short = steps <= GAP_INTERVALS * np.median(steps) + 1e-9
     allowed = _SPIKE + _JUMP_NOISE * noise + MAX_ACCELERATION / 3.0 * steps
@@ -137,13 +140,15 @@ def _find_coasted_samples(times: np.ndarray, positions: np.ndarray, jump: int, s
     As many as making up for `size` metres takes, and further back while they lie on an exact line. The first sample of
     such a line is where the player was last seen, and is left as it is.
     """
+    since = int(np.searchsorted(times, times[jump] - _COAST[1] - 1e-6))  # no earlier sample can be one of them
+    times, positions, jump = times[since:], positions[since:], jump - since
     before = times[jump] - times[: jump + 1]
     first = int(np.searchsorted(-before, -max(_COAST[0], min(size / _CATCH_UP, _COAST[1]))))
     for start in range(min(first, jump - 3), -1, -1):
         if before[start] > _COAST[1] or not _is_on_line(times[start : jump + 1], positions[start : jump + 1]):
             break
         first = start
-    return np.arange(max(first + 1, 1), jump + 1)
+    return since + np.arange(max(first + 1, 1), jump + 1)
 
 
 def _is_on_line(times: np.ndarray, positions: np.ndarray) -> bool:

@@ -1,5 +1,7 @@
 """Which joint is what, in the families of names that recordings and rigs use."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -89,6 +91,16 @@ def test_sides_and_parts(name, side, part):
 def test_a_body_without_legs_is_refused():
     with pytest.raises(InputError, match="left upper_leg"):
         identify_joints(Skeleton(("Hips", "Spine"), (-1, 0), np.zeros((2, 3))))
+
+
+def test_legs_without_length_are_refused():
+    """A scale by which their motion is transferred would be zero or endless."""
+    skeleton = build_gait(1.4, 0.5).skeleton
+    legs = [skeleton.names.index(f"Left{part}") for part in ("Leg", "Foot")]
+    offsets = np.array(skeleton.offsets)
+    offsets[legs] = 0.0
+    with pytest.raises(InputError, match="no length from LeftUpLeg to LeftFoot.*OFFSET"):
+        identify_joints(replace(skeleton, offsets=offsets))
 
 
 def test_arms_are_not_taken_for_legs_that_lack():

@@ -16,6 +16,7 @@ from beyond_mocap.motion.track import (
     clean_track,
     compute_travel_direction,
     sample_track,
+    outliers,
     smooth_zero_phase_hann,
 )
 
@@ -135,6 +136,15 @@ def test_a_long_gap_is_not_standing_and_is_warned_of():
     assert not sampled.valid[inside].any() and sampled.valid[sampled.times < 5.9].all()
     assert sampled.speed[inside].min() > 1.0
     assert any("no samples from" in line for line in report.warnings)
+
+
+def test_long_tracks_are_searched_for_outliers_in_parts(monkeypatch):
+    track, _ = made(noise=0.02, seed=3)
+    positions = track.positions + np.where(track.times > 9.0, 1.5, 0.0)[:, None]
+    whole = outliers.detect_outliers(track.times, positions, 0.02)
+    monkeypatch.setattr(outliers, "_BLOCK", 100)
+    parts = outliers.detect_outliers(track.times, positions, 0.02)
+    assert whole[0].any() and np.array_equal(whole[0], parts[0]) and whole[1] == parts[1]
 
 
 @pytest.mark.parametrize("rate", [10.0, 20.0, 50.0])
