@@ -6,7 +6,8 @@ ground is one smooth curve D(t) that cancels the velocity of the point that carr
 changes gently in between: the least squares problem of `solve_shift`, one banded system for the whole motion.
 
 A foot rolls: first the heel carries it, then the toe, on which the heel rises while it is still low and slow. Where a
-leg does not reach, people rise on their toes; so does the foot here, then the pelvis is lowered, then the foot slides.
+leg does not reach, people rise on their toes; so does the foot here, then the pelvis is lowered, then the stance is
+shortened at its ends, then the foot slides.
 """
 
 from __future__ import annotations
@@ -297,8 +298,8 @@ def solve_limited_shift(
 def trim_stances(weight: np.ndarray, planted: np.ndarray, short: np.ndarray, fps: float) -> np.ndarray:
     """Trim the weights (T, 2) of stances at the ends that a leg does not reach, so that the rest of them holds.
 
-    The foot lands up to TRIM_SECONDS later or leaves as much earlier, at most by a quarter of the stance at each end. Without
-    this, two frames at its ends would make a whole stance slide.
+    The foot lands up to TRIM_SECONDS later or leaves as much earlier, at most by a quarter of the stance at each end.
+    Without this, two frames at its ends would make a whole stance slide.
 
     Args:
         weight: (T, 2) contact weights.

@@ -15,8 +15,8 @@ from beyond_mocap.motion.track import (
     Track,
     clean_track,
     compute_travel_direction,
-    sample_track,
     outliers,
+    sample_track,
     smooth_zero_phase_hann,
 )
 
