@@ -58,7 +58,7 @@ def _read_group(group: str, name: str) -> Read:
 
 OFF_TRACK, OFF_AT_KEYS = _read_group("pelvis_error_m", "mean"), _read_group("pelvis_error_m", "keys")
 EQ18, EQ18_AT_KEYS = (_read_group("annotation_similarity", name) for name in ("eq18_all", "eq18_keys"))
-REQUESTED, REQUESTED_AT_KEYS = (_read_group("annotation_similarity", name) for name in ("asked", "keys"))
+REQUESTED, REQUESTED_AT_KEYS = (_read_group("annotation_similarity", name) for name in ("asked", "asked_keys"))
 SKATE, STANCE = _read_group("skate", "contact_cm_s"), _read_group("skate", "stance_mm_median")
 SLOWEST, FASTEST = _read_group("warp_rate", "min"), _read_group("warp_rate", "max")
 

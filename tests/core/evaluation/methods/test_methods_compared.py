@@ -85,6 +85,22 @@ def test_labels_that_no_recording_carries_count_for_no_method(comparison, timeli
     assert np.isnan(unknown) and both == asked
 
 
+def test_key_labels_that_no_recording_carries_count_for_no_method(folder, clip_file, tmp_path):
+    clip_file(tmp_path / "walk.bvh", 1.4, 4.0)
+    scenario = read_scenarios(folder, 30.0)[0][0]
+    found = compare_methods(build_library(tmp_path), [scenario], ("blocks", "baseline"), 30.0)
+    kick = found.results["scenario1", "blocks"].figures["annotation_similarity"]
+    assert kick["keys"] == 1.0 and np.isnan(kick["asked_keys"])
+    assert not any(line.startswith("Labels at key moments") for line in describe_differences(found))
+    assert all(row[1].endswith(" / –)") for row in build_tables(found)[1].rows)
+
+
+def test_key_labels_of_recordings_count_for_each_method(comparison):
+    _, found = comparison
+    shown = [found.results["scenario1", method].figures["annotation_similarity"]["asked_keys"] for method in METHODS]
+    assert shown == [-1.0, -1.0, 1.0]
+
+
 def test_what_is_noted_of_scenarios_is_in_every_report(comparison):
     pytest.importorskip("matplotlib")
     _, found = comparison
