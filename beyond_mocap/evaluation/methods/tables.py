@@ -181,8 +181,16 @@ def describe_handicaps(comparison: MethodComparison) -> list[str]:
     Args:
         comparison: the methods' results.
     """
-    return [*(HANDICAPS[method] for method in comparison.methods), *_describe_limits(comparison),
-            *_describe_thesis(comparison)]
+    return [*(HANDICAPS[method] for method in comparison.methods), *_describe_strange(comparison.methods),
+            *_describe_limits(comparison), *_describe_thesis(comparison)]
+
+
+def _describe_strange(methods: Sequence[str]) -> Iterable[str]:
+    """Describe which methods play what a library leaves out of locomotion."""
+    indifferent = [f"`{method}`" for method in methods if method not in ("path", "baseline")]
+    if indifferent:
+        yield (f"{', '.join(indifferent)}: motion that the library leaves out of locomotion is played like any other; "
+               "`path` avoids it, and `baseline` plays it only in gaits that have nothing else.")
 
 
 def _describe_limits(comparison: MethodComparison) -> Iterable[str]:

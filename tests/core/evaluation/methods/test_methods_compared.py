@@ -119,6 +119,7 @@ def test_what_is_said_follows_from_the_figures(comparison):
     assert off.mean() < 0.1
     text = "\n".join(format_markdown(found))
     assert all(f"| {method} |" in text for method in METHODS) and "Faustino's thesis" not in text
+    assert "- `blocks`, `fs`: motion that the library leaves out of locomotion is played like any other" in text
 
 
 def test_the_page_has_a_curve_of_every_scenario_and_the_report_every_figure(comparison):
