@@ -15,6 +15,7 @@ from beyond_mocap.evaluation.methods.thesis import THESIS
 from beyond_mocap.evaluation.report import evaluate
 from beyond_mocap.library.build import build_library
 from beyond_mocap.motion.track import sample_track
+from beyond_mocap.synthesis.search.blocks import SEARCH_MORE
 
 METHODS = ("blocks", "fs", "baseline")
 
@@ -108,6 +109,16 @@ def test_what_is_noted_of_scenarios_is_in_every_report(comparison):
     assert build_comparison_report(noted)["notes"] == ["turn.csv: no labels beside it"]
     for text in ("\n".join(format_markdown(noted)), build_comparison_page(noted)):
         assert "turn.csv: no labels beside it" in text
+
+
+def test_no_setting_that_a_comparison_lacks_is_advised(comparison):
+    _, found = comparison
+    line = f"the 500 nearest in labels were; {SEARCH_MORE}"
+    results = {place: replace(result, take=replace(result.take, warnings=(line,)))
+               for place, result in found.results.items()}
+    text = "\n".join(format_markdown(replace(found, results=results)))
+    assert "all takes: the 500 nearest in labels were\n" in text and SEARCH_MORE not in text
+    assert "`blocks` compared no more than 500 blocks at once in 2 of 2 takes: the library has more" in text
 
 
 def test_what_is_said_follows_from_the_figures(comparison):
