@@ -61,7 +61,7 @@ def check_labels(labels: Iterable[str], where: str) -> tuple[str, ...]:
     for label in out:
         is_time = NUMBER.fullmatch(label) or OTHER_TIME.fullmatch(label)
         if not label or "#" in label or label.startswith(AVOID_PREFIX) or label.split() != [label] or is_time:
-            expected = f"a label without spaces and '#' that is no number or time and does not begin with '{AVOID_PREFIX}'"
+            expected = f"a label without spaces and '#', no number or time, that does not begin with '{AVOID_PREFIX}'"
             raise InputError(where, f"{label!r} is not a label", expected)
     return out
 

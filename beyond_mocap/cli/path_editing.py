@@ -212,9 +212,9 @@ def _build_report(source, edited, take, path, ground) -> dict:
     else:
         report = {"version": 1, "fps": take.motion.fps, "frames": len(take.motion), "duration_s": take.motion.duration}
     report["skate"] = {**report.get("skate", {}), **(path_figures["skate"] or {})}
-    if path_figures["ground_mm"]:
-        report["ground_mm"] = {f"{source}{name}": path_figures["ground_mm"][f"{source}{of}"] for source in ("", "source_")
-                               for name, of in (("min", "deepest"), ("support_max", "standing_max"))}
+    if feet := path_figures["ground_mm"]:
+        names = {"min": "deepest", "support_max": "standing_max"}
+        report["ground_mm"] = {of + name: feet[of + names[name]] for of in ("", "source_") for name in names}
         report["unknown"] = {name: why for name, why in report["unknown"].items() if not name.startswith("ground_mm.")}
     seams = {name: path_figures["seam_jerk"][name] for name in ("median", "max")}
     report["seam_jerk_ratio"] = {**report.get("seam_jerk_ratio", {}), **seams}

@@ -53,7 +53,8 @@ def name_options(line: str, *groups: str) -> str:
     for row in (row for group in groups for row in list_settings(group) if row.option):
         option = row.option.split()[0]
         use = "leave out" if row.kind is bool and row.default else "use"
-        line = line.replace(f"use {row.title}", f"{use} {option}").replace(f"a higher {row.title}", f"a higher {option}")
+        line = line.replace(f"use {row.title}", f"{use} {option}")
+        line = line.replace(f"a higher {row.title}", f"a higher {option}")
     return line
 
 

@@ -17,7 +17,11 @@ from ...synthesis.synthesize import synthesize
 from ...synthesis.take import Take
 from .. import figures
 from ..annotation_similarity import (
-    compute_mean, list_had_labels, list_requested_labels, measure_annotation_similarity, measure_similarity,
+    compute_mean,
+    list_had_labels,
+    list_requested_labels,
+    measure_annotation_similarity,
+    measure_similarity,
 )
 from ..realism import measure_smoothness
 from ..view import View

@@ -19,7 +19,14 @@ from ..plots import MIDDLE, RIGHT, create_canvas, render_png
 from ..report import round_values
 from .comparison import MethodComparison, MethodResult
 from .scenarios import Scenario
-from .tables import ComparisonTable, build_tables, describe_differences, describe_handicaps, list_sections, list_warnings
+from .tables import (
+    ComparisonTable,
+    build_tables,
+    describe_differences,
+    describe_handicaps,
+    list_sections,
+    list_warnings,
+)
 
 _ROW = 1.15
 """Inches of height of a method's curve."""

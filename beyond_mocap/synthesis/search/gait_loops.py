@@ -1,7 +1,7 @@
 """The plain baseline: the recording of each gait that is nearest in speed, looped for as long as the gait lasts.
 
-It is what a broadcast without motion synthesis shows: a walk, a jog and a run on the track, and no actions. Where a gait
-has motion that belongs to the library's locomotion, what the library leaves out of it is not shown.
+It is what a broadcast without motion synthesis shows: a walk, a jog and a run on the track, and no actions. What the
+library leaves out of locomotion is shown only in gaits that have nothing else.
 """
 
 from __future__ import annotations
