@@ -13,7 +13,7 @@ import os
 
 from ..base.content import decode_text, is_utf16, read_bytes
 from ..base.errors import InputError, format_seconds
-from .timeline import AVOID_PREFIX, LONGEST_TIME, NUMBER, KeyMoment, Span, Timeline, format_labels
+from .timeline import AVOID_PREFIX, LONGEST_TIME, NUMBER, OTHER_TIME, KeyMoment, Span, Timeline, format_labels
 
 _EXPECTED_FORM = "'START END labels...' or 'TIME labels...'"
 _LARGEST_FILE = 16 * 1024 * 1024
@@ -108,12 +108,26 @@ def _parse_unit(tokens: list[str], place: str) -> str:
 
 def _list_leading_numbers(tokens: list[str], place: str) -> list[str]:
     """List the one or two numbers at the start of a line."""
+    for token in tokens[:2]:
+        if (seconds := _read_other_time(token)) is not None:
+            raise InputError(place, f"{token!r} is not a time", _EXPECTED_FORM,
+                             f"write seconds with a point: {_format_exact(seconds)}")
     if not NUMBER.fullmatch(tokens[0]):
         raise InputError(place, f"{tokens[0]!r} is not a time", _EXPECTED_FORM, "put the time first")
     numbers = [token for token in tokens[:3] if NUMBER.fullmatch(token)]
     if len(numbers) == 3:
         raise InputError(place, "three numbers", _EXPECTED_FORM, "put the labels after the times")
     return numbers if NUMBER.fullmatch(tokens[1] if len(tokens) > 1 else "") else numbers[:1]
+
+
+def _read_other_time(token: str) -> float | None:
+    """Read the seconds of a time with a decimal comma, or of minutes and seconds such as 1:05; None for others."""
+    if not OTHER_TIME.fullmatch(token):
+        return None
+    seconds = 0.0
+    for part in token.replace(",", ".").split(":"):
+        seconds = 60.0 * seconds + float(part)
+    return seconds
 
 
 def _parse_seconds(token: str, unit: str, fps: float | None, start: float, place: str) -> float:

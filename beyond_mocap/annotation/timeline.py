@@ -27,6 +27,9 @@ from .vocabulary import (
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?f?", re.IGNORECASE)
 """What the text form reads as a time; no label may look like one."""
 
+OTHER_TIME = re.compile(r"\d+,\d+|(\d+:){1,2}\d\d([.,]\d+)?")
+"""Times that the text form refuses: with a decimal comma, or as minutes and seconds; no label may look like one."""
+
 EDGE_TOLERANCE = 0.1
 """Seconds by which a time may be outside the track: one sample of a 10 Hz feed."""
 
@@ -56,9 +59,9 @@ def check_labels(labels: Iterable[str], where: str) -> tuple[str, ...]:
     """
     out = tuple(dict.fromkeys(str(label).lower() for label in labels))
     for label in out:
-        if not label or "#" in label or label.startswith(AVOID_PREFIX) or label.split() != [label] or NUMBER.fullmatch(
-                label):
-            expected = f"a label without spaces and '#' that is not a number and does not begin with '{AVOID_PREFIX}'"
+        is_time = NUMBER.fullmatch(label) or OTHER_TIME.fullmatch(label)
+        if not label or "#" in label or label.startswith(AVOID_PREFIX) or label.split() != [label] or is_time:
+            expected = f"a label without spaces and '#', no number or time, that does not begin with '{AVOID_PREFIX}'"
             raise InputError(where, f"{label!r} is not a label", expected)
     return out
 

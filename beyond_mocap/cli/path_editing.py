@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 _COMPLETE_SHARE = 0.95  # share of a path that counts as all of it
 _MAX_ROUNDS = 3  # searches for delays and detours at most
+_RAISED = 0.03  # metres of toes above the ground, beyond those of a synthetic gait, from which on takes differ visibly
 _HIP_HEIGHT = 0.9  # metres, rough height of hips above the ground; only decides whether bodies are on one floor
 
 
@@ -81,7 +82,7 @@ def run_path(options, reporter: ProgressReporter, writers: Mapping[str, Writer])
     reporter.check_cancelled()
     report = _build_report(source, edited, take, path, ground) if options.report else None
     reporter.check_cancelled()
-    notes = [f"{options.input}: {note}" for note in clip.notes]
+    notes = [f"{options.input}: {note}" for note in (*clip.notes, *_describe_raised_toes(source, ground))]
     if options.out.suffix.lower() == ".bvh":
         notes += [f"{options.out}: {note}" for note in bvh.write_bvh(options.out, edited.motion, clip.form)]
     else:
@@ -91,6 +92,17 @@ def run_path(options, reporter: ProgressReporter, writers: Mapping[str, Writer])
     distance = float(np.maximum(np.diff(edited.arc), 0.0).sum())  # a repeated path starts again at 0
     print(f"{options.out}: {len(edited.motion)} frames, {edited.motion.duration:.1f} s, {distance:.1f} "
           f"m{_describe_unit(clip, options)}")
+
+
+def _describe_raised_toes(source, ground) -> list[str]:
+    """Report where the toes of flat feet are above the ground, as in some recordings: in takes they are on it."""
+    from ..motion.contacts import measure_sole_height
+
+    raised = source.sole - measure_sole_height(source.motion.skeleton) if source.has_legs else 0.0
+    if raised < _RAISED or ground is not None:
+        return []
+    return [f"toes of flat feet are {100.0 * raised:.1f} cm above the ground, as recorded; in takes they are on it: "
+            f"with z_m {-raised:.3f} in the path they are here too"]
 
 
 def _describe_remaining_path(source, edited, path, options) -> list[str]:
@@ -173,9 +185,11 @@ def _edit_motion(source, path, settings, ground, options):
 
     from ..path_editing.path_edit import edit_path
     from ..path_editing.path_metrics import carry_contacts
+    from ..path_editing.snap_turns import report_snap_turns
 
     with locate_errors(f"{options.input} on {options.path}"):
         edited = edit_path(source, path, settings, ground)
+    edited = replace(edited, warnings=(*edited.warnings, *report_snap_turns(edited)))
     take = build_take(
         edited.motion, options.input.name, "ride", clip_frame=edited.frames,
         contacts=carry_contacts(edited).all(axis=2), seams=np.asarray(edited.transitions, int),
@@ -185,8 +199,11 @@ def _edit_motion(source, path, settings, ground, options):
 
 
 def _build_report(source, edited, take, path, ground) -> dict:
-    """Build the report: the common figures, and how well the motion follows the path."""
-    from ..evaluation.report import evaluate, round_values
+    """Build the report: the common figures, and how well the motion follows the path.
+
+    Heights of feet are those over the ground below them, less their height in the recording, in both.
+    """
+    from ..evaluation.report import evaluate, list_message_spans, round_values
     from ..path_editing.path_metrics import measure_path_edit
 
     path_figures = round_values(measure_path_edit(source, edited, path, ground))
@@ -195,10 +212,14 @@ def _build_report(source, edited, take, path, ground) -> dict:
     else:
         report = {"version": 1, "fps": take.motion.fps, "frames": len(take.motion), "duration_s": take.motion.duration}
     report["skate"] = {**report.get("skate", {}), **(path_figures["skate"] or {})}
+    if feet := path_figures["ground_mm"]:
+        names = {"min": "deepest", "support_max": "standing_max"}
+        report["ground_mm"] = {of + name: feet[of + names[name]] for of in ("", "source_") for name in names}
+        report["unknown"] = {name: why for name, why in report["unknown"].items() if not name.startswith("ground_mm.")}
     seams = {name: path_figures["seam_jerk"][name] for name in ("median", "max")}
     report["seam_jerk_ratio"] = {**report.get("seam_jerk_ratio", {}), **seams}
     return {**report, "root_error_m": path_figures["root_error_m"], "path": path_figures,
-            "warnings": list(take.warnings)}
+            "warnings": list(take.warnings), "warning_seconds": list_message_spans(list(take.warnings))}
 
 
 def _read_others(paths: Sequence[Path]) -> list[Follower]:

@@ -18,7 +18,7 @@ from pathlib import Path
 from .. import __version__
 from ..base.errors import InputError, describe_no_folder, format_count
 from ..base.optional_packages import import_optional
-from ..base.settings.options import add_options, option_values, parse_path
+from ..base.settings.options import add_options, name_options, option_values, parse_path
 from .outputs import ProgressReporter, Writer, build_take, check_outputs, choose_writer
 
 _MAX_LINES = 12  # notes that the command prints; the report has all
@@ -104,7 +104,7 @@ def _reconstruct_trial(options, reporter: ProgressReporter, writers: Mapping[str
     if options.ball_csv:
         notes += _write_ball(result, options.ball_csv)
     reporter.finish()
-    lines = [f"{options.trial}: {line}" for line in (*trial.notes, *result.warnings)]
+    lines = [f"{options.trial}: {name_options(line, 'markers')}" for line in (*trial.notes, *result.warnings)]
     _show_lines(reporter, [*_compare_up_axes(options, trial, static), *lines], options.report)
     for note in notes:
         reporter.show_note(note)

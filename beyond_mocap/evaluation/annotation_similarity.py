@@ -38,18 +38,28 @@ def measure_annotation_similarity(view: View) -> dict:
     requested = list_requested_labels(fill_automatic_spans(view), played.times, view.moments)
     key_requested, key_played = [m.requested.words for m in view.moments], [m.words for m in view.moments]
     library = extend_with_synthetic(view.library, played)
-    keys = () if library is None else library.keys
-    select_nearest = lru_cache(None)(lambda words: select_nearest_keys(keys, words))  # moments repeat their labels
-    had = [] if library is None else [_select_had_labels(select_nearest(moment.requested.words), moment)
-                                      for moment in view.moments]
+    had = [] if library is None else list_had_labels(view.moments, library.keys)
     return {  # means over the frames that count, as in Faustino Table 2
-        "all": _mean(measure_similarity(requested, played.words)),
-        "keys": _mean(measure_similarity(key_requested, key_played)),
-        "had_keys": _mean(measure_similarity(had, key_played)),
-        "eq18_all": _mean(measure_similarity(requested, played.words, compute_eq18)),
-        "eq18_keys": _mean(measure_similarity(key_requested, key_played, compute_eq18)),
+        "all": compute_mean(measure_similarity(requested, played.words)),
+        "keys": compute_mean(measure_similarity(key_requested, key_played)),
+        "had_keys": compute_mean(measure_similarity(had, key_played)),
+        "eq18_all": compute_mean(measure_similarity(requested, played.words, compute_eq18)),
+        "eq18_keys": compute_mean(measure_similarity(key_requested, key_played, compute_eq18)),
         "key_count": len(view.moments), "had_key_count": sum(map(bool, had)),
     }
+
+
+def list_had_labels(moments: Sequence[KeyMomentResult], keys: tuple[Key, ...]) -> list[frozenset[str] | None]:
+    """List the requested labels of each key moment that the nearest keys carry.
+
+    Args:
+        moments: the key moments.
+        keys: of the library.
+    Returns:
+        For each moment the labels, None where no key can serve it.
+    """
+    select_nearest = lru_cache(None)(lambda words: select_nearest_keys(keys, words))  # moments repeat their labels
+    return [_select_had_labels(select_nearest(moment.requested.words), moment) for moment in moments]
 
 
 def _select_had_labels(nearest: tuple[Key, ...], moment: KeyMomentResult) -> frozenset[str] | None:
@@ -169,7 +179,7 @@ def measure_similarity(
     return out
 
 
-def _mean(similarity: np.ndarray) -> float:
+def compute_mean(similarity: np.ndarray) -> float:
     """Compute the mean over the frames or moments that count, NaN without any."""
     known = similarity[np.isfinite(similarity)]
     return float(known.mean()) if len(known) else math.nan

@@ -61,7 +61,7 @@ def evaluate(take: Take, track: Track | None, library: Library | None, played: P
     warnings = list(dict.fromkeys((*take.warnings, *report["warnings"])))
     pins = [{"time_s": p.pin.time, "part": p.pin.part, "miss": p.miss} for p in take.pins]
     out = {**report, "seed": take.seed, "seconds": round_values(seconds), "method": take.method, "warnings": warnings,
-           "warning_seconds": _list_message_spans(warnings)}
+           "warning_seconds": list_message_spans(warnings)}
     if pins:
         out["pins"] = round_values(pins)
     if take.solved is not None:
@@ -106,12 +106,16 @@ def evaluate_played(
         "notes": [*notes, *list_physics_notes(view)],
     }
     out = round_values(report)
-    return {**out, "warning_seconds": _list_message_spans(report["warnings"]),
+    return {**out, "warning_seconds": list_message_spans(report["warnings"]),
             "unknown": list_unknown_figures(flatten_report(out), view)}
 
 
-def _list_message_spans(lines: list[str]) -> list[list[list[float]]]:
-    """List for each line the spans [first, last] in seconds that it refers to."""
+def list_message_spans(lines: list[str]) -> list[list[list[float]]]:
+    """List for each line the spans [first, last] in seconds that it refers to.
+
+    Args:
+        lines: messages of a take.
+    """
     return [[[round(edge, 3) for edge in span] for span in line_spans(line)] for line in lines]
 
 

@@ -114,7 +114,7 @@ def describe_foot_slide(motion: Motion, is_planted: bool) -> list[str]:
     speed, travel = slide.get("toe_cm_s") or 0.0, slide.get("stance_mm_median") or 0.0
     if speed <= _VISIBLE_TOE_SPEED and travel <= _VISIBLE_TRAVEL:
         return []
-    advice = "their markers move further than Plant Feet holds; check them" if is_planted else "use Plant Feet"
+    advice = "their markers move further than foot planting holds; check them" if is_planted else "use Plant Feet"
     return [f"standing toes slide {travel:.0f} mm in a stance, {speed:.0f} cm/s: {advice}"]
 
 

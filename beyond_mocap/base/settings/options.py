@@ -41,6 +41,23 @@ def option_values(record: type, options: argparse.Namespace, *groups: str) -> di
     return collect_values(record, rows, lambda row: getattr(options, row.name))
 
 
+def name_options(line: str, *groups: str) -> str:
+    """Name the options in a message that names settings as Blender's panels do: "use Floor at 0" -> "use --floor".
+
+    Args:
+        line: the message.
+        groups: keys of the settings table.
+    Returns:
+        The same with "use TITLE" and "a higher TITLE" as the command line has them.
+    """
+    for row in (row for group in groups for row in list_settings(group) if row.option):
+        option = row.option.split()[0]
+        use = "leave out" if row.kind is bool and row.default else "use"
+        line = line.replace(f"use {row.title}", f"{use} {option}")
+        line = line.replace(f"a higher {row.title}", f"a higher {option}")
+    return line
+
+
 def _build_arguments(row: Setting) -> dict:
     """Build the arguments of `add_argument` for a setting."""
     more = {name: value for name, value in row.option_more.items() if name not in ("least", "most")}

@@ -16,7 +16,13 @@ from ...synthesis.quality.playback import playback_from_take
 from ...synthesis.synthesize import synthesize
 from ...synthesis.take import Take
 from .. import figures
-from ..annotation_similarity import list_requested_labels, measure_annotation_similarity, measure_similarity
+from ..annotation_similarity import (
+    compute_mean,
+    list_had_labels,
+    list_requested_labels,
+    measure_annotation_similarity,
+    measure_similarity,
+)
 from ..realism import measure_smoothness
 from ..view import View
 from .scenarios import Scenario
@@ -139,8 +145,8 @@ def measure_take(take: Take, library: Library, timeline: Timeline, seconds: floa
     """Measure a take.
 
     Beside the labels that the method was asked for, `asked` measures those of the scenario alone: automatic locomotion
-    differs by method, since only "path" takes its gaits from the clips' labels. Labels that no recording carries count
-    for no method.
+    differs by method, since only "path" takes its gaits from the clips' labels. `asked_keys` measures those at the key
+    moments. Labels that no recording carries count for no method, also where "path" shows them with a synthetic clip.
 
     Args:
         take: the take.
@@ -152,9 +158,10 @@ def measure_take(take: Take, library: Library, timeline: Timeline, seconds: floa
     view = View(played, take.plan.track, take.timeline, library)
     labels = [row and (row & library.labels) or None
               for row in list_requested_labels(timeline, played.times, view.moments)]
-    asked = measure_similarity(labels, played.words)
+    key_labels = list_had_labels(view.moments, library.keys)
     similarity = {**measure_annotation_similarity(view),
-                  "asked": float(np.nanmean(asked)) if np.isfinite(asked).any() else np.nan}
+                  "asked": compute_mean(measure_similarity(labels, played.words)),
+                  "asked_keys": compute_mean(measure_similarity(key_labels, [m.words for m in view.moments]))}
     groups = {**figures.measure_path_errors(view), **figures.measure_feet(view), **figures.measure_transitions(view),
               "annotation_similarity": similarity}
     curve = measure_smoothness(played.motion.skeleton, played.positions, view.fps)

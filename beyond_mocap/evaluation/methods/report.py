@@ -19,7 +19,14 @@ from ..plots import MIDDLE, RIGHT, create_canvas, render_png
 from ..report import round_values
 from .comparison import MethodComparison, MethodResult
 from .scenarios import Scenario
-from .tables import ComparisonTable, build_tables, describe_differences, describe_handicaps, list_sections
+from .tables import (
+    ComparisonTable,
+    build_tables,
+    describe_differences,
+    describe_handicaps,
+    list_sections,
+    list_warnings,
+)
 
 _ROW = 1.15
 """Inches of height of a method's curve."""
@@ -102,4 +109,4 @@ def build_comparison_report(comparison: MethodComparison) -> Mapping:
 def _build_result_values(result: MethodResult) -> dict:
     """Build the values of one take."""
     return {**result.figures, "seconds": result.seconds, "smoothness_times_s": result.times.tolist(),
-            "smoothness_m": result.smoothness.tolist(), "warnings": list(result.take.warnings)}
+            "smoothness_m": result.smoothness.tolist(), "warnings": list_warnings(result)}

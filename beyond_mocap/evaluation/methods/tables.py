@@ -58,7 +58,7 @@ def _read_group(group: str, name: str) -> Read:
 
 OFF_TRACK, OFF_AT_KEYS = _read_group("pelvis_error_m", "mean"), _read_group("pelvis_error_m", "keys")
 EQ18, EQ18_AT_KEYS = (_read_group("annotation_similarity", name) for name in ("eq18_all", "eq18_keys"))
-REQUESTED, REQUESTED_AT_KEYS = (_read_group("annotation_similarity", name) for name in ("asked", "keys"))
+REQUESTED, REQUESTED_AT_KEYS = (_read_group("annotation_similarity", name) for name in ("asked", "asked_keys"))
 SKATE, STANCE = _read_group("skate", "contact_cm_s"), _read_group("skate", "stance_mm_median")
 SLOWEST, FASTEST = _read_group("warp_rate", "min"), _read_group("warp_rate", "max")
 
@@ -90,8 +90,8 @@ def build_tables(comparison: MethodComparison) -> list[ComparisonTable]:
             lambda thesis: "{:.2f} / {:.2f}".format(*thesis.distance)),
         _build_table(
             comparison, "Annotation similarity (Table 2)",
-            f"Equation 18 as printed, {at_keys}; in brackets over the labels of the scenario alone, without automatic "
-            "locomotion and what is shown beside them. -1: all are met.",
+            f"Equation 18 as printed, {at_keys}; in brackets over the labels of the scenario that recordings "
+            "carry, without automatic locomotion and what is shown beside them. -1: all are met.",
             [Column(read=EQ18), Column(read=EQ18_AT_KEYS, before=" / "), Column(read=REQUESTED, before=" ("),
              Column(read=REQUESTED_AT_KEYS, before=" / ", after=")")],
             lambda thesis: "{:.2f} / {:.2f}".format(*thesis.similarity)),
@@ -181,8 +181,16 @@ def describe_handicaps(comparison: MethodComparison) -> list[str]:
     Args:
         comparison: the methods' results.
     """
-    return [*(HANDICAPS[method] for method in comparison.methods), *_describe_limits(comparison),
-            *_describe_thesis(comparison)]
+    return [*(HANDICAPS[method] for method in comparison.methods), *_describe_strange(comparison.methods),
+            *_describe_limits(comparison), *_describe_thesis(comparison)]
+
+
+def _describe_strange(methods: Sequence[str]) -> Iterable[str]:
+    """Describe which methods play what a library leaves out of locomotion."""
+    indifferent = [f"`{method}`" for method in methods if method not in ("path", "baseline")]
+    if indifferent:
+        yield (f"{', '.join(indifferent)}: motion that the library leaves out of locomotion is played like any other; "
+               "`path` avoids it, and `baseline` plays it only in gaits that have nothing else.")
 
 
 def _describe_limits(comparison: MethodComparison) -> Iterable[str]:
@@ -219,12 +227,21 @@ def list_sections(comparison: MethodComparison) -> list[tuple[str, list[str]]]:
     return [(title, lines) for title, lines in found if lines]
 
 
+def list_warnings(result: MethodResult) -> list[str]:
+    """List the warnings of a take, without advice on settings that a comparison does not have.
+
+    Args:
+        result: what a method made of a scenario.
+    """
+    return [line.removesuffix(f"; {SEARCH_MORE}") for line in result.take.warnings]
+
+
 def _describe_warnings(comparison: MethodComparison) -> list[str]:
     """Describe each warning of the takes once, with the takes that have it."""
     takes: dict[str, list[str]] = {}
     for (scenario, method), result in comparison.results.items():
-        for line in result.take.warnings:
-            takes.setdefault(str(line), []).append(f"`{method}` in {scenario}")
+        for line in list_warnings(result):
+            takes.setdefault(line, []).append(f"`{method}` in {scenario}")
     return [f"{'all takes' if len(found) == len(comparison.results) else ', '.join(found)}: {line}"
             for line, found in takes.items()]
 

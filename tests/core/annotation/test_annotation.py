@@ -153,6 +153,11 @@ def test_any_line_of_plausible_tokens_is_read_or_refused(tokens):
     "text, where, part",
     [
         ("0 5 walking\nfive 6 kick", "a.txt:2", "'five' is not a time"),
+        ("5,5 kick", "a.txt:1", "'5,5' is not a time"),
+        ("5,5 kick", "a.txt:1", "write seconds with a point: 5.5"),
+        ("00:05 kick", "a.txt:1", "write seconds with a point: 5"),
+        ("0 1:02,5 walking", "a.txt:1", "write seconds with a point: 62.5"),
+        ("0 1:01:00 walking", "a.txt:1", "write seconds with a point: 3660"),
         ("5 3 walking", "a.txt:1", "not after the start"),
         ("4 4 walking", "a.txt:1", "write one time for a key moment"),
         ("1 2 3 walking", "a.txt:1", "three numbers"),
@@ -220,7 +225,7 @@ def test_a_missing_file_is_told(tmp_path):
 
 
 def test_words_that_the_text_form_cannot_carry_are_refused():
-    for word in ("two words", "5", "a#b", "", "3.5f"):
+    for word in ("two words", "5", "a#b", "", "3.5f", "5,5", "1:05"):
         with pytest.raises(InputError):
             Span(0, 1, (word,))
 

@@ -11,13 +11,14 @@ from beyond_mocap.ball.physics import THROWN_BALLS
 from beyond_mocap.base import settings
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.base.settings import TABLES, find_setting
-from beyond_mocap.base.settings.options import option_values
+from beyond_mocap.base.settings.options import name_options, option_values
 from beyond_mocap.base.settings.setting import Setting, check_limits
 from beyond_mocap.cli.main import build_parser
 from beyond_mocap.motion.mass import SEGMENT_MASSES
 from beyond_mocap.motion.momentum import STRENGTH
 from beyond_mocap.path_editing.path_frame import FRAMES
 from beyond_mocap.synthesis.plan import Plan
+from beyond_mocap.synthesis.search.blocks import SEARCH_MORE
 from command_pages import iter_commands
 from pages import SETTINGS_PAGE, build_settings_page
 
@@ -93,6 +94,16 @@ def test_a_row_is_an_option_with_its_default_and_limits(with_sharpness):
         with_sharpness.parse_args([*FILES, "--sharpness", "1.5"])
     with pytest.raises(InputError, match="^sharpness: "):
         check_limits(Corners(2.0), settings.list_settings("synthesis"))
+
+
+@pytest.mark.parametrize("line, group, named", [
+    ("the floor is at +0.8 m; use Floor at 0 to move it", "markers", "the floor is at +0.8 m; use --floor to move it"),
+    ("toes slide 30 mm: use Plant Feet", "markers", "toes slide 30 mm: leave out --no-plant"),
+    (SEARCH_MORE, "synthesis", "a higher --max-blocks compares more and takes longer"),
+    ("the floor and Plant Feet", "markers", "the floor and Plant Feet"),
+])
+def test_messages_name_settings_as_the_command_line_does(line, group, named):
+    assert name_options(line, group) == named
 
 
 def test_a_row_is_on_the_page_of_settings(with_sharpness):

@@ -1,6 +1,7 @@
 """The verb `path`: what comes out keeps the recording's form and speed, and one line for what is wrong."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from beyond_mocap.cli.main import main
 from beyond_mocap.cli.outputs import ProgressReporter
 from beyond_mocap.files.bvh import bvh
+from beyond_mocap.motion.contacts import measure_floor_height
 from beyond_mocap.synthesis.provenance import read_provenance
 from beyond_mocap.synthetic.gait import build_gait
 
@@ -103,6 +105,41 @@ def test_a_path_far_longer_than_the_motion_is_told(run):
     for more, curve in ((["--cycle"], "bend"), ([], "short"), (["--no-arc-length"], "bend"),
                         (["--end", "repeat"], "bend")):
         assert not any("repeats it" in line for line in run(*more, curve=curve)[2]), more
+
+
+def test_the_report_has_one_height_of_feet_over_the_ground_below_them(run, tmp_path):
+    for curve in ("bend", "hill"):
+        assert run("--report", tmp_path / "r.json", curve=curve)[0] == 0
+        report = json.loads((tmp_path / "r.json").read_text())
+        feet, path = report["ground_mm"], report["path"]["ground_mm"]
+        assert (feet["min"], feet["support_max"]) == (path["deepest"], path["standing_max"])
+        assert feet["source_min"] == path["source_deepest"] and feet["support_max"] < 5.0  # on a hill too
+        assert not any(name.startswith("ground_mm") for name in report["unknown"])
+
+
+def test_toes_above_the_ground_are_told_with_the_way_down(run, place, tmp_path):
+    walk = bvh.read_bvh(place / "walk.bvh", 0.01).motion
+    bvh.write_bvh(place / "raised.bvh", replace(walk, root_positions=walk.root_positions + [0.0, 0.0, 0.025]))
+    (line,) = (line for line in run(recording="raised")[2] if "toes" in line)
+    assert "toes of flat feet are 4.4 cm above the ground" in line and "z_m -0.044" in line
+    assert not any("toes" in line for line in run()[2])
+    assert not any("toes" in line for line in run("--ground", place / "flat.obj", recording="raised")[2])
+    rows = (place / "bend.csv").read_text().replace(",0.00000\n", ",-0.04400\n")
+    (place / "low.csv").write_text(rows)
+    assert run(recording="raised", curve="low")[0] == 0
+    assert abs(measure_floor_height(bvh.read_bvh(tmp_path / "out.bvh", 0.01).motion)) < 0.003
+
+
+def test_a_hairpin_is_told_and_a_turn_of_the_recording_is_not(run, place, tmp_path):
+    (place / "hairpin.csv").write_text("x_m,y_m\n0,0\n2,0\n0,0.1\n")
+    assert run("--report", tmp_path / "r.json", curve="hairpin")[0] == 0
+    report = json.loads((tmp_path / "r.json").read_text())
+    line, spans = next(pair for pair in zip(report["warnings"], report["warning_seconds"]) if "75 degrees" in pair[0])
+    assert line.endswith(" s: the body turns by more than 75 degrees within 0.3 s: smooth the path there")
+    assert spans[0][0] == pytest.approx(2.0 / 1.4, abs=0.3)
+    bvh.write_bvh(place / "turned.bvh", bvh.read_bvh(tmp_path / "out.bvh", 0.01).motion)
+    for recording in ("walk", "turned"):
+        assert not any("75 degrees" in line for line in run(recording=recording)[2]), recording
 
 
 def test_the_unit_is_told_where_it_is_not_the_inputs(run):

@@ -15,6 +15,7 @@ from beyond_mocap.evaluation.methods.thesis import THESIS
 from beyond_mocap.evaluation.report import evaluate
 from beyond_mocap.library.build import build_library
 from beyond_mocap.motion.track import sample_track
+from beyond_mocap.synthesis.search.blocks import SEARCH_MORE
 
 METHODS = ("blocks", "fs", "baseline")
 
@@ -85,6 +86,22 @@ def test_labels_that_no_recording_carries_count_for_no_method(comparison, timeli
     assert np.isnan(unknown) and both == asked
 
 
+def test_key_labels_that_no_recording_carries_count_for_no_method(folder, clip_file, tmp_path):
+    clip_file(tmp_path / "walk.bvh", 1.4, 4.0)
+    scenario = read_scenarios(folder, 30.0)[0][0]
+    found = compare_methods(build_library(tmp_path), [scenario], ("blocks", "baseline"), 30.0)
+    kick = found.results["scenario1", "blocks"].figures["annotation_similarity"]
+    assert kick["keys"] == 1.0 and np.isnan(kick["asked_keys"])
+    assert not any(line.startswith("Labels at key moments") for line in describe_differences(found))
+    assert all(row[1].endswith(" / –)") for row in build_tables(found)[1].rows)
+
+
+def test_key_labels_of_recordings_count_for_each_method(comparison):
+    _, found = comparison
+    shown = [found.results["scenario1", method].figures["annotation_similarity"]["asked_keys"] for method in METHODS]
+    assert shown == [-1.0, -1.0, 1.0]
+
+
 def test_what_is_noted_of_scenarios_is_in_every_report(comparison):
     pytest.importorskip("matplotlib")
     _, found = comparison
@@ -92,6 +109,16 @@ def test_what_is_noted_of_scenarios_is_in_every_report(comparison):
     assert build_comparison_report(noted)["notes"] == ["turn.csv: no labels beside it"]
     for text in ("\n".join(format_markdown(noted)), build_comparison_page(noted)):
         assert "turn.csv: no labels beside it" in text
+
+
+def test_no_setting_that_a_comparison_lacks_is_advised(comparison):
+    _, found = comparison
+    line = f"the 500 nearest in labels were; {SEARCH_MORE}"
+    results = {place: replace(result, take=replace(result.take, warnings=(line,)))
+               for place, result in found.results.items()}
+    text = "\n".join(format_markdown(replace(found, results=results)))
+    assert "all takes: the 500 nearest in labels were\n" in text and SEARCH_MORE not in text
+    assert "`blocks` compared no more than 500 blocks at once in 2 of 2 takes: the library has more" in text
 
 
 def test_what_is_said_follows_from_the_figures(comparison):
@@ -103,6 +130,7 @@ def test_what_is_said_follows_from_the_figures(comparison):
     assert off.mean() < 0.1
     text = "\n".join(format_markdown(found))
     assert all(f"| {method} |" in text for method in METHODS) and "Faustino's thesis" not in text
+    assert "- `blocks`, `fs`: motion that the library leaves out of locomotion is played like any other" in text
 
 
 def test_the_page_has_a_curve_of_every_scenario_and_the_report_every_figure(comparison):

@@ -23,11 +23,19 @@ def test_each_gait_is_one_recording_that_loops(library, order, track_of):
         assert library.gaits[gait].label in library.clips[library.frames.clip[first]].labels_at(0.0)
 
 
-def test_of_several_recordings_the_nearest_in_speed_is_looped(clip_file, track_of, tmp_path):
+def list_looped(library, track) -> set[str]:
+    request = build_request(library, resolve_plan(Plan(track=track, method="baseline"), library))
+    return {library.clips[clip].path for clip in build_gait_loops(library, request).clip}
+
+
+def test_of_several_recordings_the_nearest_in_speed_is_looped_that_belongs(clip_file, track_of, tmp_path):
     for speed in (1.1, 1.6):
         clip_file(tmp_path / f"walk_{speed:g}.bvh", speed, 4.0)
     library = build_library(tmp_path)
     for speed in (1.1, 1.6):
-        plan = Plan(track=track_of(speed, 3.0), method="baseline")
-        edit = build_gait_loops(library, build_request(library, resolve_plan(plan, library)))
-        assert {library.clips[clip].path for clip in edit.clip} == {f"walk_{speed:g}.bvh"}
+        assert list_looped(library, track_of(speed, 3.0)) == {f"walk_{speed:g}.bvh"}
+    slow = np.array([clip.path == "walk_1.1.bvh" for clip in library.clips])[library.frames.clip]
+    vars(library)["strangeness"] = np.where(slow, np.float32(2.0), library.strangeness)  # as of a crouch
+    assert list_looped(library, track_of(1.1, 3.0)) == {"walk_1.6.bvh"}
+    vars(library)["strangeness"] = np.full(len(library.frames), np.float32(2.0))  # a gait of crouches alone
+    assert list_looped(library, track_of(1.1, 3.0)) == {"walk_1.1.bvh"}
