@@ -171,9 +171,8 @@ def plant_feet(
         short = [measure_shortfall(foot, goal, drop) for foot, (goal, _) in zip(feet, goals)]
         if attempt == _RELAX_ROUNDS or max(s.max(initial=0.0) for s in short) <= _SLIDE_TOLERANCE:
             break
-        trimmed = [trim_stances(weight, foot.contact_weight > 0.0, s, fps)
+        relaxed = [relax_stances(weight, foot.contact_weight > 0.0, s, fps)
                    for weight, foot, s in zip(weights, feet, short)]
-        relaxed = [relax_contact_weights(weight, s) for weight, s in zip(trimmed, short)]
         is_new = [not np.array_equal(weight, before) for weight, before in zip(relaxed, weights)]
         weights = relaxed
     root = root - drop[:, None] * [0.0, 0.0, 1.0]
@@ -295,17 +294,23 @@ def solve_limited_shift(
     return ground, weight
 
 
-def trim_stances(weight: np.ndarray, planted: np.ndarray, short: np.ndarray, fps: float) -> np.ndarray:
-    """Trim the weights (T, 2) of stances at the ends that a leg does not reach, so that the rest of them holds.
-
-    The foot lands up to TRIM_SECONDS later or leaves as much earlier, at most by a quarter of the stance at each end.
-    Without this, two frames at its ends would make a whole stance slide.
+def relax_stances(weight: np.ndarray, planted: np.ndarray, short: np.ndarray, fps: float) -> np.ndarray:
+    """Relax the contact weights (T, 2) of stances that a leg does not reach: only their ends where that is enough.
 
     Args:
         weight: (T, 2) contact weights.
         planted: (T,) bool, frames of stances.
         short: (T,) m that the leg is too short.
         fps: frames per second.
+    """
+    return relax_contact_weights(_trim_stances(weight, planted, short, fps), short)
+
+
+def _trim_stances(weight: np.ndarray, planted: np.ndarray, short: np.ndarray, fps: float) -> np.ndarray:
+    """Trim the weights (T, 2) of stances at the ends that a leg does not reach, so that the rest of them holds.
+
+    The foot lands up to TRIM_SECONDS later or leaves as much earlier, at most by a quarter of the stance at each end.
+    Without this, two frames at its ends would make a whole stance slide.
     """
     weight = weight.copy()
     for first, end in find_runs(planted):

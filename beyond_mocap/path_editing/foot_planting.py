@@ -121,7 +121,8 @@ def plant_feet_on_ground(skeleton: Skeleton, root: np.ndarray, rotations: np.nda
         lacking = [foot_plant.measure_shortfall(foot, goal, drop) for foot, (goal, _) in zip(placed_feet, goals)]
         if round_number == _ROUNDS or max(s.max(initial=0.0) for s in lacking) <= _SLIDES_FROM:
             break
-        firm = [foot_plant.relax_contact_weights(weight, s) for weight, s in zip(firm, lacking)]
+        firm = [foot_plant.relax_stances(weight, foot.contact_weight > 0.0, s, fps)
+                for weight, foot, s in zip(firm, feet, lacking)]
     # `down` is how far the whole body goes down: both drops, less the rise of the ground.
     down = (first + drop - up)[:, None] * _UP
     places = places - down[:, None]
