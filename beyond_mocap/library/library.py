@@ -313,9 +313,10 @@ class Library:
         paths = [clip.path for clip in self.clips if not (clip.annotations or clip.mirrored or clip.is_synthetic)]
         if not paths:
             return ()
-        named = ", ".join(paths[:_NAMED_CLIPS]) + (f" and {len(paths) - _NAMED_CLIPS} more" if paths[_NAMED_CLIPS:] else "")
+        more = f" and {len(paths) - _NAMED_CLIPS} more" if len(paths) > _NAMED_CLIPS else ""
         verbs = ("has", "is") if len(paths) == 1 else ("have", "are")
-        what = f"{format_count(len(paths), 'clip')} {verbs[0]} no labels and {verbs[1]} not used: {named}"
+        what = f"{format_count(len(paths), 'clip')} {verbs[0]} no labels and {verbs[1]} not used: "
+        what += ", ".join(paths[:_NAMED_CLIPS]) + more
         return (f"{what}; label what they show, since labels are proposed only where no clip has any",)
 
     @property
