@@ -309,7 +309,7 @@ class Library:
 
     @property
     def unlabelled_notes(self) -> tuple[str, ...]:
-        """A line that names the recordings without labels, which no take shows; empty where all have some."""
+        """A line that names the recordings without labels, which are not used; empty where all have some."""
         paths = [clip.path for clip in self.clips if not (clip.annotations or clip.mirrored or clip.is_synthetic)]
         if not paths:
             return ()
