@@ -92,6 +92,14 @@ def find_runs(flags: np.ndarray) -> list[tuple[int, int]]:
     return list(zip(edges[::2].tolist(), edges[1::2].tolist()))
 
 
+def drop_short_runs(flags: np.ndarray, least: float) -> np.ndarray:
+    """Keep the runs of True of flags (T,) that have at least so many frames."""
+    kept = np.zeros_like(flags)
+    for first, end in find_runs(flags):
+        kept[first:end] = end - first >= least
+    return kept
+
+
 def find_equal_runs(values: np.ndarray) -> list[tuple[int, int]]:
     """Find the runs of equal neighbours; each run begins where the previous one ends.
 

@@ -81,7 +81,7 @@ def summarize_library(library) -> dict:
         "gaits: " + ", ".join(f"{g['word']} {g['speed_m_s']:.1f} m/s" for g in gaits),
         f"fastest: {library.max_speed:.1f} m/s",
         "key moments: " + ("" if keys else "none"), *(f"  {key}" for key in keys),
-        *library.proposal_notes,
+        *library.proposal_notes, *library.unlabelled_notes,
         *library.coverage.lines.values(),
         *describe_left_out(library, MAX_LEFT_OUT),
         *library.notes,

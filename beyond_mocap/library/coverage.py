@@ -120,7 +120,7 @@ class Coverage:
             "speeds": self.speed_gaps, "sideways": _span([walk[0] for walk in self.side_walks]),
             "backward": _span(self.back_speeds),
         }.get(kind)
-        return describe_lack(kind, instead, " and ".join(map(_format_range, ranges)) + " m/s" if ranges else None)
+        return describe_lack(kind, instead, format_speeds(ranges) if ranges else None)
 
 
 def describe_lack(kind: str, instead: str, speeds: str | None = None) -> str:
@@ -138,6 +138,11 @@ def describe_lack(kind: str, instead: str, speeds: str | None = None) -> str:
 
 def _span(speeds: Sequence[float]) -> tuple[tuple[float, float], ...]:
     return ((min(speeds), max(speeds)),) if speeds else ()
+
+
+def format_speeds(ranges: Sequence[tuple[float, float]]) -> str:
+    """Format ranges of speeds, from and to m/s, such as "1.5 to 2.9 and 3.8 m/s"."""
+    return " and ".join(map(_format_range, ranges)) + " m/s"
 
 
 def _format_range(ends: tuple[float, float]) -> str:
@@ -214,15 +219,14 @@ def find_speed_gaps(speed: np.ndarray, fps: float) -> tuple[tuple[float, float],
         speed: (N,) m/s of frames of locomotion.
         fps: of those frames.
     Returns:
-        (from, to) m/s of all gaps, from the slowest recording's speed, if that is a walk, to a sprint.
+        (from, to) m/s of all gaps, from the slowest recording's speed, if that is a walk, to a sprint; one from a slow
+        walk to a sprint where no speed is reached.
     """
     grid = np.exp(np.arange(np.log(_SLOWEST_SPEED), np.log(MAX_SPEED), np.log(_GRID)))
     ordered = np.sort(speed)
     reached = np.searchsorted(ordered, grid / WARP[0]) - np.searchsorted(ordered, grid / WARP[1])
     lacking = reached < MIN_SPEED_SECONDS * fps
-    if lacking.all():
-        return ()
-    slowest = int(np.argmin(lacking))
+    slowest = int(np.argmin(lacking))  # 0 where all is lacking
     lacking[:slowest] = grid[slowest] > SLOWEST_WALK
     ends = np.append(grid, MAX_SPEED)
     return tuple((float(grid[a]), float(ends[b])) for a, b in find_runs(lacking))

@@ -39,6 +39,7 @@ MIN_RUN_SECONDS = 2.0  # of a track's runs from which on long runs are needed
 RESTING_SPEED = 0.1  # m/s of a track below which a player stands
 RECORDED_INDEX = "index"
 """Name under which what is computed from the recordings alone is cached."""
+_NAMED_CLIPS = 3  # clips that a line names
 _STANCE_NUMBERS = tuple(field.name for field in fields(NeutralStance) if field.name != "skeleton")
 Progress = Callable[[float, str], None]
 
@@ -305,6 +306,18 @@ class Library:
         what = f"labels proposed for {format_count(count, 'clip')}, since no clip has any: check them with Review " \
                "Proposals in Blender, or in the table that the command 'library' writes"
         return (what,) if count else ()
+
+    @property
+    def unlabelled_notes(self) -> tuple[str, ...]:
+        """A line that names the recordings without labels, which are not used; empty where all have some."""
+        paths = [clip.path for clip in self.clips if not (clip.annotations or clip.mirrored or clip.is_synthetic)]
+        if not paths:
+            return ()
+        more = f" and {len(paths) - _NAMED_CLIPS} more" if len(paths) > _NAMED_CLIPS else ""
+        verbs = ("has", "is") if len(paths) == 1 else ("have", "are")
+        what = f"{format_count(len(paths), 'clip')} {verbs[0]} no labels and {verbs[1]} not used: "
+        what += ", ".join(paths[:_NAMED_CLIPS]) + more
+        return (f"{what}; label what they show, since labels are proposed only where no clip has any",)
 
     @property
     def minutes(self) -> float:

@@ -40,7 +40,7 @@ _LEAST_VARIANCE = 2e-3
 _VARIANCE_OF_FEW = 2.0  # over the number of frames: few frames of one person know little of their spread
 # steady travel: seconds, least m/s, range of the speed as a share of it, radians of turn, share of the speed forward
 _STEADY_SECONDS, _STEADY_SPEED, _STEADY_RANGE, _STEADY_TURN, _FORWARD = 1.5, 0.8, 0.35, np.radians(75.0), 0.7
-_WALKING_CLASS = 2  # the fastest class whose arms and trunk show how people stand
+_WALKING_CLASS = 2  # the fastest class of walking, whose arms and trunk show how people stand
 FALL_HEIGHT, FALL_SECONDS, LEG_LENGTH = 0.15, 0.2, 0.86
 """m by which hips fall in s, of a body with a leg of LEG_LENGTH m, that people who walk and run do not show."""
 
@@ -134,16 +134,18 @@ class NormalPostures:
             posture: (T, K) of `compute_postures`.
             speed: (T,) m/s.
         Returns:
-            (T,) float32: 1 at the end of the region, up to which a frame belongs; 0 where the library has none.
+            (T,) float32: 1 at the end of the region, up to which a frame belongs; 0 where no region judges that speed.
         """
         kind, out = np.digitize(speed, SPEED_EDGES), np.zeros(len(posture), np.float32)
-        for k in np.unique(kind) if self.regions else ():
-            middle, inverse, radius = self.regions[self._find_class(int(k))]
+        for k in np.unique(kind):
+            judge = self._find_judge(int(k))
+            if judge is None:
+                continue
+            middle, inverse, radius = self.regions[judge]
             away = posture[kind == k] - middle
             squared = np.maximum(np.einsum("ij,ij->i", away @ inverse, away), 0.0)
             out[kind == k] = np.sqrt(squared) / (radius + BELONGING)
         return out
-
 
     def measure_parts(self, posture: np.ndarray, speed: np.ndarray) -> dict[str, tuple[float, np.ndarray]]:
         """Measure how unlike normal locomotion each part of the body is in postures of about one speed.
@@ -153,11 +155,13 @@ class NormalPostures:
             speed: (T,) m/s.
         Returns:
             Part of PARTS -> how far its mean squared Mahalanobis distance lies above what is expected, in standard
-            deviations, and its mean offset (k,) from the region's middle; empty where the library has no region.
+            deviations, and its mean offset (k,) from the region's middle; empty where no region judges any of them.
         """
-        if not self.regions:
+        kinds = np.digitize((np.mean(speed), *speed), SPEED_EDGES)  # where none judges the mean, one judges a part
+        judges = [judge for k in kinds if (judge := self._find_judge(int(k))) is not None]
+        if not judges:
             return {}
-        middle, inverse, _ = self.regions[self._find_class(int(np.digitize(np.mean(speed), SPEED_EDGES)))]
+        middle, inverse, _ = self.regions[judges[0]]
         away, covariance, found = posture - middle, np.linalg.inv(inverse), {}
         for part, columns in PARTS.items():
             own = away[:, columns]
@@ -167,9 +171,14 @@ class NormalPostures:
                 found[part] = (float(squared.mean() - count) / np.sqrt(2.0 * count), own.mean(axis=0))
         return found
 
-    def _find_class(self, kind: int) -> int:
-        """Find the nearest class that has a region."""
-        return min(self.regions, key=lambda other: (abs(other - kind), other))
+    def _find_judge(self, kind: int) -> int | None:
+        """Find the class whose region judges a class: itself, or else the next faster one of the same gait; None
+        without one.
+
+        A walk's region calls all runs strange, a stand's all walks, and a jog's two thirds of the frames of sprints.
+        """
+        fastest = _WALKING_CLASS if kind <= _WALKING_CLASS else len(SPEED_EDGES)
+        return min((other for other in self.regions if kind <= other <= fastest), default=None)
 
 
 def select_calm_postures(posture: np.ndarray) -> np.ndarray:

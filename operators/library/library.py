@@ -207,16 +207,18 @@ def describe_library(library: "Library") -> str:
 
 
 def describe_gaps(library: "Library") -> str:
-    """Describe for the panel, one line each, what is proposed, missing and left out of locomotion; the first line sums
-    it up; "" where there is nothing to say.
+    """Describe for the panel, one line each, what is proposed, without labels, missing and left out of locomotion; the
+    first line sums it up; "" where there is nothing to say.
     """
     from ...beyond_mocap.library.left_out import describe_left_out
 
     missing, left_out = list(library.coverage.lines.values()), describe_left_out(library, MAX_LEFT_OUT)
+    labels = [*library.proposal_notes, *library.unlabelled_notes]
     parts = ["Proposed labels"] if library.proposal_notes else []
+    parts += ["Clips without labels"] if library.unlabelled_notes else []
     parts += [f"{format_count(len(missing), 'motion')} missing"] if missing else []
     parts += [left_out[0].partition(":")[0]] if left_out else []
-    return "\n".join([", ".join(parts), *library.proposal_notes, *missing, *left_out]) if parts else ""
+    return "\n".join([", ".join(parts), *labels, *missing, *left_out]) if parts else ""
 
 
 class ListOrder(NamedTuple):

@@ -18,7 +18,7 @@ import numpy as np
 from ...annotation import Timeline, labels_per_frame
 from ...annotation.ball_contact import takes_with_foot
 from ...base.errors import TimedMessage, format_seconds
-from ...base.time_series import find_runs, time_derivative
+from ...base.time_series import drop_short_runs, find_runs, time_derivative
 from ...library.clip import (
     BACK_PREFIX,
     BLEND_PREFIX,
@@ -33,7 +33,7 @@ from ...library.clip import (
     TURN_PREFIX,
     WALK_PREFIX,
 )
-from ...library.coverage import CALM_SPEED, STEP_SPEEDS, classify_steps, compute_turn_rate, describe_lack
+from ...library.coverage import CALM_SPEED, STEP_SPEEDS, Coverage, classify_steps, compute_turn_rate, describe_lack
 from ...library.features import SMOOTH_SECONDS
 from ...library.library import RESTING_SPEED, Library
 from ...library.missing_actions import ACTION_PREFIX, describe_action, list_action_labels
@@ -44,6 +44,7 @@ from ...motion.track import Track, smooth_zero_phase_hann
 from . import movement
 from .moments import KeyMomentResult, evaluate_moments, measure_contact
 from .playback import Playback, compute_playback_rate, find_transitions
+from .shown_speeds import describe_lacking_speeds, explain_shown_speeds
 from .targets import KEY_TARGETS, TARGETS
 
 WARP_LIMITS = (TARGETS["warp_rate.min"].least, TARGETS["warp_rate.max"].most)
@@ -202,9 +203,13 @@ def _report_synthetic(played: Playback, library: Library | None) -> list[TimedMe
     kinds += [(kicks, "synthetic kick on the run: no recorded kick is as fast as the player"),
               (run_ups, "run-up of a synthetic kick: no recorded motion fits as well")]
     kinds += [(there, f"synthetic {name}: no recorded one fits") for name, there in _list_shown_actions(played)]
-    kinds += [(_frames_of_clips(played, SYNTHETIC_FOLDER + prefix) if prefix else others, describe(kind, instead))
-              for prefix, kind, instead in _SYNTHETIC_INSTEAD]
-    return [_build_line(played.times, there, what, f" ({np.sum(there) / played.motion.fps:.1f} s in all)")
+    fps = played.motion.fps
+    speed = movement.measure_travel_speed(played.pelvis, fps)
+    for prefix, kind, instead in _SYNTHETIC_INSTEAD:
+        there = _frames_of_clips(played, SYNTHETIC_FOLDER + prefix) if prefix else others
+        kinds += (explain_shown_speeds(library, there, speed, fps, instead)
+                  if kind == "speeds" and library is not None else [(there, describe(kind, instead))])
+    return [_build_line(played.times, there, what, f" ({np.sum(there) / fps:.1f} s in all)")
             for there, what in kinds]
 
 
@@ -254,17 +259,20 @@ def _report_missing_motion(played: Playback, library: Library | None) -> list[Ti
         "speeds": ~synthetic & (speed > STEP_SPEEDS[0]) & (speed < coverage.slowest_speed),
         **{kind: flags & ~(synthetic & ~ahead) & ~recorded[kind] for kind, flags in steps.items()},
     }
-    return [_build_line(played.times, _drop_short_runs(there, MISSING_SECONDS * fps), coverage.lines[kind]
-                        if kind == "belonging" else coverage.describe_lack(kind, "the nearest recording is shown"))
-            for kind, there in needed.items() if coverage.lacks(kind)]
+    lines = []
+    for kind, flags in needed.items():
+        there = drop_short_runs(flags, MISSING_SECONDS * fps)
+        if coverage.lacks(kind) and there.any():
+            lines.append(_build_line(played.times, there, _describe_missing_motion(coverage, kind, speed[there])))
+    return lines
 
 
-def _drop_short_runs(flags: np.ndarray, least: float) -> np.ndarray:
-    """Keep the runs of True of flags (T,) that have at least so many frames."""
-    kept = np.zeros_like(flags)
-    for first, end in find_runs(flags):
-        kept[first:end] = end - first >= least
-    return kept
+def _describe_missing_motion(coverage: Coverage, kind: str, speed: np.ndarray) -> str:
+    """Describe a kind of motion that recordings lack, for which others are shown at speeds (T,) m/s."""
+    instead = "the nearest recording is shown"
+    if kind == "speeds":
+        return describe_lacking_speeds(coverage, [speed], instead)
+    return coverage.lines[kind] if kind == "belonging" else coverage.describe_lack(kind, instead)
 
 
 def _classify_recorded_steps(played: Playback, library: Library) -> dict[str, np.ndarray]:

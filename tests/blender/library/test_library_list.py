@@ -89,6 +89,7 @@ def test_what_a_library_lacks_is_shown(listed):
     bpy.ops.beyond_mocap.build_library()
     gaps = bpy.context.scene.beyond_mocap.library_gaps
     assert "missing" in gaps.splitlines()[0] and "hardly any turns in place: add some" in gaps
+    assert "1 clip has no labels and is not used: other.bvh; " in gaps
     assert "Proposed" not in gaps
     assert not any("proposed" in clip.messages for clip in listed.shown)
 

@@ -4,13 +4,14 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from beyond_mocap.base.time_series import find_equal_runs, find_runs, number_runs
+from beyond_mocap.base.time_series import drop_short_runs, find_equal_runs, find_runs, number_runs
 
 
 def test_runs_at_both_ends_and_between():
     assert find_runs(np.array([True, True, False, True, False, False, True])) == [(0, 2), (3, 4), (6, 7)]
     assert find_runs(np.zeros(4, bool)) == [] and find_runs(np.zeros(0, bool)) == [] and find_runs(np.ones(3,
             bool)) == [(0, 3)]
+    assert drop_short_runs(np.array([True, True, False, True, False, True]), 2).tolist() == [True] * 2 + [False] * 4
 
 
 @given(st.lists(st.booleans(), max_size=40))

@@ -10,6 +10,7 @@ from beyond_mocap.evaluation.report import evaluate
 from beyond_mocap.library.clip import SYNTHETIC_FOLDER
 from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.quality.playback import playback_from_take
+from beyond_mocap.synthesis.quality.shown_speeds import explain_shown_speeds
 from beyond_mocap.synthesis.quality.unmet_constraints import format_stretches, report_jolts, report_unmet_constraints
 
 
@@ -82,7 +83,23 @@ def test_a_track_faster_than_the_library_is_told_but_not_where_running_is_made(j
     lines = told(made, track=fast)
     assert not any("faster than the library" in line for line in lines)
     assert any(line.startswith("10.0-18.0 s (8.0 s in all): ")
-               and line.endswith("until then synthetic running is shown") for line in lines)
+               and line.endswith("; synthetic running is shown") for line in lines)
+
+
+def test_synthetic_locomotion_is_explained_by_the_speeds_at_which_it_is_shown(library):
+    """Gaps lie around 2 m/s and above 5.6 m/s."""
+    speed, fps, running = np.repeat([2.0, 2.8, 2.1, 2.8, 8.0], [60, 8, 40, 60, 30]), 30.0, "synthetic running is shown"
+    there = np.arange(len(speed)) < 168
+    (lacking, why), (other, otherwise) = explain_shown_speeds(library, there, speed, fps, running)
+    assert lacking[:108].all() and not lacking[108:].any() and np.array_equal(other, there & ~lacking)
+    assert why == f"hardly any locomotion at 2.0 to 2.1 m/s: add some; until then {running}"
+    assert otherwise == f"no recording fits as well at 2.8 m/s; {running}"
+    (_, both), = explain_shown_speeds(library, speed != 2.8, speed, fps, running)
+    assert both.startswith("hardly any locomotion at 2.0 to 2.1 and 8.0 m/s: ")
+    strange = replace(library)
+    vars(strange).update(coverage=library.coverage, strangeness=np.full(len(library.frames), 2.0))
+    (_, left_out), = explain_shown_speeds(strange, speed == 2.8, speed, fps, running)
+    assert left_out == f"the recordings at 2.8 m/s are left out of locomotion, as the library's lines say; {running}"
 
 
 def test_key_moments_late_or_out_of_reach_are_told(cut, told, still_ball):

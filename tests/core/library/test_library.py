@@ -1,9 +1,12 @@
 """A folder of clips becomes a library: what is planted in it comes out, and what is wrong is told in one line."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError, UserCancelledError
+from beyond_mocap.cli.library import summarize_library
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.features import build_label_matrix
@@ -213,6 +216,19 @@ def test_proposals_stop_with_the_first_annotation(tmp_path, clip_file):
     clip_file(tmp_path / "silent.bvh", 1.0, 2.0, "")
     library = build_library(tmp_path)
     assert library.proposal_notes == () and clip_of(library, "silent.bvh").annotations == ()
+
+
+def test_clips_without_labels_are_named_where_others_have_some(tmp_path, clip_file):
+    clip_file(tmp_path / "walk.bvh")
+    assert build_library(tmp_path).unlabelled_notes == ()
+    clip_file(tmp_path / "runs" / "fast.bvh", 4.0, 2.0, "")
+    library = build_library(tmp_path)
+    line, = library.unlabelled_notes
+    assert line.startswith("1 clip has no labels and is not used: runs/fast.bvh; label ")
+    assert line in summarize_library(library)["lines"]
+    more = tuple(replace(clip_of(library, "runs/fast.bvh"), path=f"{number}.bvh") for number in range(5))
+    line, = replace(library, clips=more).unlabelled_notes
+    assert line.startswith("5 clips have no labels and are not used: 0.bvh, 1.bvh, 2.bvh and 2 more; label ")
 
 
 def test_rows_beyond_the_clip_are_cut_or_told(tmp_path, clip_file):

@@ -53,8 +53,10 @@ def test_a_second_of_recording_is_not_enough_to_fill_a_gap():
     assert len(find_speed_gaps(np.r_[np.full(300, 1.5), np.full(30, 2.2), np.full(300, 3.0)], 30.0)) == 2
 
 
-def test_no_locomotion_no_gaps():
-    assert find_speed_gaps(np.zeros(100), 30.0) == ()
+@pytest.mark.parametrize("speed", [np.zeros(100), np.linspace(7.0, 9.0, 30)])
+def test_where_too_little_is_recorded_at_any_speed_all_is_one_gap(speed):
+    (low, high), = find_speed_gaps(speed, 30.0)
+    assert low < 0.7 and high == MAX_SPEED
 
 
 def test_made_clips_fill_the_gaps_up_to_a_sprint(library, more):

@@ -10,6 +10,7 @@ from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.left_out import describe_left_out, find_left_out, measure_speed_classes
 from beyond_mocap.library.loops.standing_loops import LOOP_SECONDS, iter_standing_loops
+from beyond_mocap.library.posture import NormalPostures
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import Motion, compute_pose, forward_kinematics
@@ -95,6 +96,27 @@ def test_fights_that_outnumber_walks_are_still_no_locomotion(outnumbered):
     assert all(np.mean(strangeness_of(outnumbered, f"fight{number}.bvh") > 1.0) > 0.9 for number in range(6))
     assert all(np.mean(strangeness_of(outnumbered, name) > 1.0) < 0.05 for name in ("walk0.bvh", "walk1.bvh",
                                                                                    "stand.bvh"))
+
+
+def test_a_few_seconds_of_runs_are_not_judged_by_walks(tmp_path):
+    """Nor by stands, nor sprints by jogs: only the next faster class of the same gait judges."""
+    for number, (speed, seconds) in enumerate(((0.9, 8.0), (1.6, 8.0), (2.7, 1.4), (3.5, 1.4), (6.0, 1.4))):
+        gait = "walking" if speed < 2.0 else "running"
+        motion = build_gait(speed, seconds, 30.0, seed=number)
+        write_clip(tmp_path / f"{gait}{number}.bvh", motion, f"0 {seconds} {gait}\n")
+    library = build_library(tmp_path)
+    assert set(library.normal_postures.regions) == {1, 2} and find_left_out(library) == ()
+    assert not any(strangeness_of(library, f"running{number}.bvh").any() for number in (2, 3, 4))
+
+
+@pytest.mark.parametrize("known, judged", [({1, 2}, (0, 1, 2)), ({0}, (0,)), ({2, 4}, (0, 1, 2, 3, 4)),
+                                           ({5}, (3, 4, 5)), (set(), ())])
+def test_a_class_without_a_region_is_judged_by_the_next_faster_of_its_gait(known, judged):
+    speeds = np.array([0.2, 0.8, 1.6, 2.5, 4.0, 6.0])
+    region = np.zeros(18), np.eye(18), 1.0
+    postures = NormalPostures({kind: region for kind in known})
+    assert tuple(np.flatnonzero(postures.measure_strangeness(np.full((6, 18), 9.0), speeds))) == judged
+    assert bool(postures.measure_parts(np.full((2, 18), 9.0), speeds[[0, 5]])) == bool({0, 5} & set(judged))
 
 
 def test_hops_are_no_walk(tmp_path):

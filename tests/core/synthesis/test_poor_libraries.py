@@ -24,6 +24,7 @@ TIMES = np.arange(0.0, 10.0, 0.04)
 FIGHT = 0.7 + 0.6 * np.sin(2.0 * np.pi * np.arange(240) / 30.0 / 1.5)
 LIBRARIES = {
     "a walk": {"walk": (1.3, "walking")},
+    "a second of a sprint": {"sprint": (np.full(36, 8.0), "sprinting")},
     "runs": {"run": (3.2, "running"), "fast": (4.6, "running")},
     "fights": {"fight": (FIGHT, "walking"), "push": (FIGHT[::-1] * 0.9, "walking")},
     "boxing": {"box": (0.0, "standing"), "advance": (1.1, "walking"), "after": (1.4, "walking")},
@@ -98,6 +99,8 @@ def test_a_poor_library_moves_any_player_and_says_what_it_lacks(poor, name):
     take = synthesize_path(poor(name), TRACKS["walks, stands and runs"])
     assert any("add" in line for line in take.warnings) or name == "no turn"
     assert all("\n" not in line for line in take.warnings)
+    slides = [line for line in take.warnings if "a planted foot slides" in line]
+    assert not slides or float(slides[0].split("up to ")[1].split(" cm")[0]) < 30.0
 
 
 @pytest.mark.parametrize("path", TRACKS)
