@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.time_series import compute_running_maximum
 from ..base.vectors import dot_products, measure_lengths, unit_vectors
 from .humanoid import Humanoid, Limb, identify_joints
 from .motion import Motion, compute_pose, forward_kinematics
@@ -16,7 +17,7 @@ from .motion import Motion, compute_pose, forward_kinematics
 _RAISED, _APART, _LOWERED = np.sin(np.radians(20.0)), np.sin(np.radians(-50.0)), np.sin(np.radians(-60.0))
 # parts of the arms' directions to their side at least and ahead at most; least cosines between upper arm and forearm,
 # trunk and vertical, leg and vertical (legs are apart in the rest poses of some skeletons)
-_SIDEWAYS, _AHEAD, _STRAIGHT, _UPRIGHT_TRUNK, _UPRIGHT_LEG = 0.4, 0.5, 0.94, 0.94, 0.82
+_SIDEWAYS, _AHEAD, _STRAIGHT, _UPRIGHT_TRUNK, _UPRIGHT_LEG = 0.4, 0.5, 0.9, 0.94, 0.82
 _STILL_SPEED, _STILL_SECONDS = 0.4, 0.2  # m/s of the fastest joint over s
 _JUMP = 0.15  # m that both hands move in the frame after a T-pose that is shorter than _STILL_SECONDS
 _LOWERING_SECONDS = 2.0  # s at most until the arms are lowered
@@ -76,8 +77,11 @@ def _measure_first(places: np.ndarray, body: Humanoid, fps: float) -> int:
     shown, reach = _select_t_poses(places, body), max(1, int(round(_STILL_SECONDS * fps)))
     later = np.minimum(np.arange(len(places)) + reach, len(places) - 1)
     is_still = measure_lengths(places[later] - places).max(axis=1) * fps < _STILL_SPEED * reach
-    end = _count_leading(shown)
-    if not end or not (is_still[0] or end < reach and _jumps(places[end - 1 : end + 1], body)):
+    if not shown[0]:
+        return 0
+    # hands that shake at the limits of a T-pose do not end it
+    end = 1 + int(np.flatnonzero(shown[: _count_leading(compute_running_maximum(shown, 0, reach // 2))])[-1])
+    if not (is_still[0] or end < reach and _jumps(places[end - 1 : end + 1], body)):
         return 0
     return end + _count_lowering(_compute_arms(places[end - 1 :], body), fps)
 

@@ -60,6 +60,11 @@ def test_the_arms_are_lowered_with_it(walk):
     assert end == 0 and start == pytest.approx(30 + 30 * 60 / 85, abs=2)
 
 
+def test_hands_that_shake_at_its_limits_do_not_end_it(walk):
+    shaking = spread_arms(hold(walk, 0, 3.0), 103.0 + np.random.default_rng(0).normal(0.0, 3.0, 90))
+    assert find_t_poses(join(spread_arms(hold(walk, 0, 0.5)), shaking, walk)) == (105, 0)
+
+
 def test_a_recording_of_nothing_else_is_left_out(walk):
     calibration = spread_arms(hold(walk, 0, 2.0))
     assert find_t_poses(calibration) == (len(calibration), 0)
