@@ -226,7 +226,8 @@ def _read_clips(recordings: _Recordings, arrays: Path | None, notes: list[str], 
     for (source_notes, motion, pops, drift, ball), path in zip(_iter_levelled(recordings, report, cancelled),
                                                                recordings.paths):
         units += source_notes
-        levelled.append(t_poses.add_recording(motion, partial(recordings.annotations.read_rows, path, motion.fps)))
+        read_rows = partial(recordings.annotations.read_rows, path, motion.fps)
+        levelled.append(t_poses.add_recording(path, motion, read_rows))
         changes.append((pops, drift))
         seen.append(ball)
     t_poses.check(recordings.folder)

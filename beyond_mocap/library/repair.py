@@ -334,17 +334,23 @@ class TPoses:
         self.frames: list[tuple[int, int]] = []
         self._lengths: list[tuple[int, float]] = []  # frames and frames per second of each recording
 
-    def add_recording(self, motion: Motion, read_rows: Callable[[], Sequence[ClipAnnotation]]) -> Motion:
+    def add_recording(self, path: Path, motion: Motion, read_rows: Callable[[], Sequence[ClipAnnotation]]) -> Motion:
         """Find the T-poses of a recording and replace them by the first and the last pose that is none.
 
         Args:
+            path: its file, for messages.
             motion: T frames.
             read_rows: reads a person's annotations of it. Where one names an act that such a stretch shows, such as a
                 celebration, it is kept.
         Returns:
             The motion; itself where it has no T-pose, or nothing else.
+        Raises:
+            InputError: naming the file, if its skeleton has no legs.
         """
-        found = find_t_poses(motion)
+        try:
+            found = find_t_poses(motion)
+        except InputError as error:
+            raise InputError(path, str(error)) from None
         if any(found) and any(_shows_act(row, found, len(motion)) for row in read_rows()):
             found = 0, 0
         self.frames.append(found)

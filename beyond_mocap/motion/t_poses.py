@@ -31,6 +31,8 @@ def find_t_poses(motion: Motion) -> tuple[int, int]:
         motion: T frames.
     Returns:
         Number of frames at the start and at the end; (T, 0) where the recording shows nothing else.
+    Raises:
+        InputError: if the skeleton has no legs.
     """
     body, ends = identify_joints(motion.skeleton), [0, -1]
     if not all(_has_arm(limb) for limb in (body.left, body.right)):

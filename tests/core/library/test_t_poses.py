@@ -1,5 +1,7 @@
 """T-poses at the start and the end of recordings are left out; level arms in the middle, or while moving, stay."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -93,7 +95,7 @@ def test_an_act_that_a_person_names_there_stays(walk):
     motion = join(spread_arms(hold(walk, 0, 1.0)), walk)
     for words, frames in ((("celebration",), (0, 0)), (("standing",), (30, 0))):
         t_poses = TPoses()
-        t_poses.add_recording(motion, lambda words=words: [ClipAnnotation(0, 29, None, words)])
+        t_poses.add_recording(Path("clip.bvh"), motion, lambda words=words: [ClipAnnotation(0, 29, None, words)])
         assert t_poses.frames == [frames]
 
 
