@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -216,17 +217,20 @@ def _read_clips(recordings: _Recordings, arrays: Path | None, notes: list[str], 
     """
     from ..appearance.arm_clearance import ArmClearance
     from .recorded_ball.contact_keys import move_keys_to_contacts
-    from .repair import describe_repairs
+    from .repair import TPoses, describe_repairs
     from .synthetic_clips import sample_each_second
 
-    levelled, changes = MotionWriter(arrays and arrays / "levelled.npy"), []
+    levelled, changes, t_poses = MotionWriter(arrays and arrays / "levelled.npy"), [], TPoses()
     units: list[str] = []
     seen: list[BodyBall | None] = []
-    for source_notes, motion, pops, drift, ball in _iter_levelled(recordings, report, cancelled):
+    for (source_notes, motion, pops, drift, ball), path in zip(_iter_levelled(recordings, report, cancelled),
+                                                               recordings.paths):
         units += source_notes
-        levelled.append(motion)
+        read_rows = partial(recordings.annotations.read_rows, path, motion.fps)
+        levelled.append(t_poses.add_recording(path, motion, read_rows))
         changes.append((pops, drift))
         seen.append(ball)
+    t_poses.check(recordings.folder)
     notes += _collect_unit_notes(units)
     motions = levelled.finish()
     rows = _read_rows(recordings, motions, notes)
@@ -237,18 +241,21 @@ def _read_clips(recordings: _Recordings, arrays: Path | None, notes: list[str], 
     levelled.discard()
     motions = repaired.finish()
     if is_proposed:
-        rows = _propose_rows(recordings, motions, report, cancelled)
+        rows = _propose_rows(recordings, motions, t_poses.frames, report, cancelled)
+    rows = t_poses.cut_rows(rows)
     balls = [None if ball is None else ball.place(motion) for ball, motion in zip(seen, motions)]
     rows = move_keys_to_contacts(motions, balls, rows, notes)
+    notes += t_poses.describe()
     notes += describe_repairs([(one, pops) for one, (pops, _) in zip(repairs, changes)])
     figures = [RepairFigures(pops, one.drift, *one.slide) for one, (pops, _) in zip(repairs, changes)]
-    arms = ArmClearance(sample_each_second(motions))
+    arms = ArmClearance(sample_each_second(one for one, is_shown in zip(motions, t_poses.is_shown) if is_shown))
     complete = MotionWriter(arrays and arrays / cache.MOTIONS)
     known: list[dict] = []  # all of a clip but its motion
-    for original, what, ball in zip(_iter_completed(recordings, motions, rows, contacts, notes), figures, balls):
+    for original, what, ball, frames in zip(_iter_completed(recordings, motions, rows, contacts, notes), figures, balls,
+                                            t_poses.frames):
         _check_cancelled(cancelled)
         original = replace(original, motion=arms.clear(original.motion), repair_figures=what, ball=ball,
-                           has_proposed_labels=is_proposed)
+                           has_proposed_labels=is_proposed, t_pose_frames=frames)
         for clip in (original, original.build_twin()):
             complete.append(clip.motion)
             known.append({name: value for name, value in vars(clip).items() if name != "motion"})
@@ -300,16 +307,16 @@ def _describe_cut_rows(cut: Sequence[tuple[ClipAnnotation, int]], folder: Path) 
     return [f"{place}: the row ends at frame {row.end:.0f}, cut to the clip's last, {last}{similar}"]
 
 
-def _propose_rows(recordings: _Recordings, motions: Sequence[Motion], report: Progress,
-                  cancelled) -> list[tuple[ClipAnnotation, ...]]:
+def _propose_rows(recordings: _Recordings, motions: Sequence[Motion], t_pose_frames: Sequence[tuple[int, int]],
+                  report: Progress, cancelled) -> list[tuple[ClipAnnotation, ...]]:
     """Propose the annotations of all clips; InputError where nothing is proposed."""
     from .proposals import propose_labels
 
     rows, least = [], find_setting("library.learn", "least").default
-    for number, motion in enumerate(motions):
+    for number, (motion, left_out) in enumerate(zip(motions, t_pose_frames)):
         _check_cancelled(cancelled)
         report(0.68 + 0.02 * number / len(motions), "Proposing labels")
-        proposals = propose_labels(motion, classifier=recordings.classifier)
+        proposals = propose_labels(motion, classifier=recordings.classifier, t_pose_frames=left_out)
         rows.append(tuple(one.annotation for one in proposals if one.confidence >= least))
     if not any(rows):
         raise InputError(

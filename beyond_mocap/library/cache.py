@@ -324,7 +324,7 @@ def _build_header(key: str, library) -> dict:
         "clips": [[clip.path, clip.mirrored, clip.motion.fps, len(clip.motion),
                    [[row.start, row.end, row.key, row.words] for row in clip.annotations], clip.recorded_count,
                    asdict(clip.repair_figures) if clip.repair_figures else None, clip.has_proposed_labels,
-                   0 if clip.ball is None else len(clip.ball)]
+                   clip.t_pose_frames, 0 if clip.ball is None else len(clip.ball)]
                   for clip in library.clips],
     }  # fmt: skip
 
@@ -374,11 +374,13 @@ def _restore_fields(header: dict, arrays: dict) -> dict:
     shapes = ((skeleton, row[3], row[2]) for row in header["clips"])
     motions = divide_into_motions(arrays[Path(MOTIONS).stem], shapes)
     clips, start, ball_start = [], 0, 0
-    for motion, (path, mirrored, _, count, rows, recorded, mended, is_proposed, known) in zip(motions, header["clips"]):
+    for motion, (path, mirrored, _, count, rows, recorded, mended, is_proposed, t_pose, known) in zip(motions,
+                                                                                                     header["clips"]):
         annotations = tuple(ClipAnnotation(first, end, key, tuple(words)) for first, end, key, words in rows)
         clips.append(Clip(path=path, mirrored=mirrored, motion=motion, annotations=annotations,
                           heel_toe_contacts=arrays["contacts"][start : start + count], recorded_count=recorded,
                           repair_figures=mended and RepairFigures(**mended), has_proposed_labels=is_proposed,
+                          t_pose_frames=tuple(t_pose),
                           ball=arrays["balls"][ball_start : ball_start + known] if known else None))
         start, ball_start = start + count, ball_start + known
     frames = Frames(

@@ -15,6 +15,7 @@ SYNTHETIC_FOLDER, LANDING_FOLDER = f"{CACHE_FOLDER}/made-gait/", f"{CACHE_FOLDER
 """Below a library: synthetic clips, and recordings that end in flight with their synthetic end."""
 
 SYNTHETIC_FPS = 60.0  # of synthetic clips
+T_POSE_MARGIN = 0.35  # s beside a T-pose in which the smoothed path of features is slower than the body
 # how the file names of blends, kicks, long stands, long runs, walks and synthetic stands begin, and those of steps
 BLEND_PREFIX, KICK_PREFIX, STAND_PREFIX, LOOP_PREFIX = "blend_", "kick_", "stand_", "loop_"
 WALK_PREFIX, STILL_PREFIX = "walk_", "still_"
@@ -52,6 +53,8 @@ class Clip:
             None: all.
         repair_figures: what the repair found and left; None for synthetic clips.
         has_proposed_labels: whether the annotations are proposed (`library.proposals`), not written by a person.
+        t_pose_frames: number of recorded frames at the start and at the end that show a T-pose in the file
+            (`library.repair`), and the pose beside it here; nothing learns from them or plays them.
         ball: (T, 3) m of the recorded frames, the ball's centre in the motion's world, NaN where it is not known; None
             without a ball (`library.recorded_ball`).
     """
@@ -64,6 +67,7 @@ class Clip:
     recorded_count: int | None = None
     repair_figures: RepairFigures | None = None
     has_proposed_labels: bool = False
+    t_pose_frames: tuple[int, int] = (0, 0)
     ball: np.ndarray | None = None
 
     @property
@@ -86,6 +90,12 @@ class Clip:
             return self.path
         return LANDING_FOLDER + self.path + ("" if self.path.lower().endswith(".bvh") else ".bvh")
 
+    def select_t_poses(self, frames: np.ndarray) -> np.ndarray:
+        """Select those of `frames` (T,), in the clip's own rate, that lie in a T-pose or beside it: (T,) bool."""
+        (start, end), margin = self.t_pose_frames, T_POSE_MARGIN * self.motion.fps
+        last = (len(self.motion) if self.recorded_count is None else self.recorded_count) - 1
+        return ((start > 0) & (frames < start + margin)) | ((end > 0) & (frames > last - end - margin))
+
     @property
     def contacts(self) -> np.ndarray:
         """(T, 2) bool: left and right foot flat on the ground."""
@@ -102,4 +112,5 @@ class Clip:
         ball = None if self.ball is None else self.ball * (1.0, -1.0, 1.0)
         return Clip(path=self.path, mirrored=not self.mirrored, motion=mirror(self.motion), annotations=rows, ball=ball,
                     heel_toe_contacts=heel_toe_contacts, recorded_count=self.recorded_count,
-                    repair_figures=self.repair_figures, has_proposed_labels=self.has_proposed_labels)
+                    repair_figures=self.repair_figures, has_proposed_labels=self.has_proposed_labels,
+                    t_pose_frames=self.t_pose_frames)

@@ -37,6 +37,7 @@ from .receptions import find_cut_receptions
 
 MIN_RUN_SECONDS = 2.0  # of a track's runs from which on long runs are needed
 RESTING_SPEED = 0.1  # m/s of a track below which a player stands
+_NEVER_SHOWN = np.float32(10.0)  # strangeness of T-poses
 RECORDED_INDEX = "index"
 """Name under which what is computed from the recordings alone is cached."""
 _NAMED_CLIPS = 3  # clips that a line names
@@ -134,14 +135,26 @@ class Library:
         """(N,) float32: how far each frame's posture lies from normal locomotion, up to 1 it belongs (`posture`)."""
         strangeness = self.normal_postures.measure_strangeness(self.frames.posture, self.frames.speed)
         strangeness = np.maximum(strangeness, measure_falls(self.frames, self.fps))
+        strangeness[self.shows_t_pose] = _NEVER_SHOWN
         # synthetic clips are locomotion at speeds that nothing recorded has
         return np.where(self._is_recorded, strangeness, np.float32(0.0))
+
+    @cached_property
+    def shows_t_pose(self) -> np.ndarray:
+        """(N,) bool, frames in a T-pose at the start or the end of a recording, or beside it (`library.repair`)."""
+        shown = np.zeros(len(self.frames), bool)
+        for index, clip in enumerate(self.clips):
+            if any(clip.t_pose_frames):
+                first = self.frames.first[index]
+                shown[first : first + self.frames.count[index]] = clip.select_t_poses(self._select_clip_frames(index))
+        return shown
 
     @cached_property
     def normal_postures(self) -> NormalPostures:
         """How people of this library stand, walk, jog and run; cached, because every take asks for it."""
         return NormalPostures.from_arrays(self._find_stored(
-            "postures", lambda: fit_normal_postures(self.frames, self._is_recorded, self.fps).to_arrays()))
+            "postures", lambda: fit_normal_postures(self.frames, self._is_recorded & ~self.shows_t_pose,
+                                                    self.fps).to_arrays()))
 
     @cached_property
     def neutral_stance(self) -> NeutralStance:

@@ -130,6 +130,8 @@ def _grade_clip(clip: Clip, speed: float, jerk: float) -> tuple[int, tuple[str, 
         if figures.pops:
             details.append(f"jumps removed: {figures.pops}")
     details.append(f"jerk: {jerk:.1f} x usual")
+    if any(clip.t_pose_frames):
+        details.append(f"T-pose left out: {sum(clip.t_pose_frames) / clip.motion.fps:.1f} s")
     if clip.recorded_count is not None:
         details.append("ends in flight: synthetic landing added")
     if clip.has_proposed_labels:

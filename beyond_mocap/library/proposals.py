@@ -13,7 +13,7 @@ input: it weighs them with what it has learned, and they stay for all acts that 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,6 +29,7 @@ from ..base.vectors import arctan2
 from ..motion import contacts, quaternion
 from ..motion.humanoid import Humanoid, compute_heading_from_positions, identify_joints, measure_leg_length
 from ..motion.motion import Motion, forward_kinematics
+from ..motion.t_poses import find_t_poses
 from .label_sources import Proposal
 from .library import Library
 
@@ -55,7 +56,8 @@ _LYING, _UP = 0.45, 0.85  # pelvis height in leg lengths: of a body on the groun
 
 
 def propose_labels(
-    motion: Motion, gaits: Sequence[tuple[str, float]] = GAITS, classifier: "Classifier | None" = None
+    motion: Motion, gaits: Sequence[tuple[str, float]] = GAITS, classifier: "Classifier | None" = None,
+    t_pose_frames: tuple[int, int] | None = None,
 ) -> tuple[Proposal, ...]:
     """Propose labels for a recording.
 
@@ -63,17 +65,29 @@ def propose_labels(
         motion: T frames.
         gaits: each gait's label and the m/s from which on it applies, slow to fast (`list_gaits` of a library).
         classifier: trained on annotated clips; None uses the rules alone.
+        t_pose_frames: number of frames at the start and at the end that get no labels; None finds T-poses.
+            So the jump out of one is no kick.
     Returns:
         The proposals, ordered by their first frame.
     Raises:
         InputError: if the skeleton has no legs.
     """
+    first, at_end = find_t_poses(motion) if t_pose_frames is None else t_pose_frames
+    if first or at_end:
+        left = motion.frames(first, len(motion) - at_end) if first + at_end < len(motion) else None
+        proposals = () if left is None else propose_labels(left, gaits, classifier, (0, 0))
+        return tuple(replace(one, annotation=_shift_row(one.annotation, first)) for one in proposals)
     seen = _RecordingSignals.from_motion(motion)
     kicks = _propose_kicks(seen)
     low = _propose_ground(seen)
     proposals = [*_propose_locomotion(seen, gaits), *kicks, *_propose_jumps(seen, kicks), *_propose_turns(seen), *low]
     rule_proposals = tuple(sorted(proposals, key=lambda one: (one.annotation.start, one.annotation.end)))
     return rule_proposals if classifier is None else classifier.propose_labels(motion, rule_proposals)
+
+
+def _shift_row(row: ClipAnnotation, frames: int) -> ClipAnnotation:
+    key = None if row.key is None else row.key + frames
+    return replace(row, start=row.start + frames, end=row.end + frames, key=key)
 
 
 def list_gaits(library: Library) -> tuple[tuple[str, float], ...]:

@@ -1,4 +1,4 @@
-"""Repairs recordings on entry: single-frame pops, a floor that drifts or tilts, and feet that slide while in contact.
+"""Repairs recordings on entry: T-poses, single-frame pops, a floor that drifts or tilts, feet that slide in contact.
 
 Inertial suits dead-reckon the pelvis, so their travel and their floor drift and planted feet slide (0.35 to 0.7 m/s in
 real data); optical recordings have pops where a marker was swapped and a floor that is centimetres off. A library that
@@ -15,20 +15,25 @@ sliding where it slides by more than recordings of its speed from good capture v
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from scipy.ndimage import minimum_filter1d
 
+from ..annotation import ClipAnnotation
 from ..base.banded_least_squares import BandedLeastSquares
-from ..base.errors import format_count
+from ..base.errors import InputError, format_count
 from ..base.time_series import find_runs
 from ..motion import contacts, quaternion
 from ..motion.foot_plant import plant_feet
 from ..motion.humanoid import identify_joints
 from ..motion.motion import Motion, forward_kinematics
+from ..motion.t_poses import find_t_poses
 from ..motion.track import smooth_zero_phase_hann
+from .clip import T_POSE_MARGIN
+from .library import find_gait_label
 
 # a rotation that jumps by more than this (radians) and by so many times what its neighbours move, and returns
 _POP = np.radians(12.0)
@@ -313,3 +318,98 @@ def describe_repairs(repaired: Sequence[tuple[Repair, int]]) -> list[str]:
             f"path corrected by {np.median([one.travel for one in sliding]):.2f} m (median)"
         )
     return lines
+
+
+class TPoses:
+    """The T-poses of a library's recordings, which are added in their order.
+
+    Their frames stay, so that the times of labels and source frames are those of the file, but they repeat the pose
+    beside them, carry no labels, and nothing plays them or learns from them.
+
+    Attributes:
+        frames: number of frames at the start and at the end of each recording, as of `find_t_poses`.
+    """
+
+    def __init__(self):
+        self.frames: list[tuple[int, int]] = []
+        self._lengths: list[tuple[int, float]] = []  # frames and frames per second of each recording
+
+    def add_recording(self, path: Path, motion: Motion, read_rows: Callable[[], Sequence[ClipAnnotation]]) -> Motion:
+        """Find the T-poses of a recording and replace them by the first and the last pose that is none.
+
+        Args:
+            path: its file, for messages.
+            motion: T frames.
+            read_rows: reads a person's annotations of it. Where one names an act that such a stretch shows, such as a
+                celebration, it is kept.
+        Returns:
+            The motion; itself where it has no T-pose, or nothing else.
+        Raises:
+            InputError: naming the file, if its skeleton has no legs.
+        """
+        try:
+            found = find_t_poses(motion)
+        except InputError as error:
+            raise InputError(path, str(error)) from None
+        if any(found) and any(_shows_act(row, found, len(motion)) for row in read_rows()):
+            found = 0, 0
+        self.frames.append(found)
+        self._lengths.append((len(motion), motion.fps))
+        first, end = found[0], len(motion) - found[1]
+        if first >= end or not any(found):
+            return motion
+        shown = np.clip(np.arange(len(motion)), first, end - 1)
+        return replace(motion, root_positions=motion.root_positions[shown], rotations=motion.rotations[shown])
+
+    @property
+    def is_shown(self) -> list[bool]:
+        """Whether each recording shows more than a T-pose."""
+        return [found[0] < count for found, (count, _) in zip(self.frames, self._lengths)]
+
+    def check(self, folder: Path) -> None:
+        """Check the recordings of a folder; InputError where none shows more than a T-pose."""
+        if not any(self.is_shown):
+            raise InputError(folder, "nothing but T-poses", "recordings of motion",
+                             "add recordings of people who walk and stand")
+
+    def cut_rows(self, rows: Sequence[tuple[ClipAnnotation, ...]]) -> list[tuple[ClipAnnotation, ...]]:
+        """Cut the annotations of all recordings to what is left of them, but not their key moments."""
+        out = []
+        for own, found, (count, fps) in zip(rows, self.frames, self._lengths):
+            if any(found):
+                start, end = (round(frames + T_POSE_MARGIN * fps) if frames else 0 for frames in found)
+                own = _cut_rows(own, start, count - 1 - end)
+            out.append(own)
+        return out
+
+    def describe(self) -> list[str]:
+        """Describe what is left out: a line for starts, for ends, and for recordings with nothing else."""
+        lines = []
+        for side, place in enumerate(("start", "end")):
+            seconds = [found[side] / fps for found, (_, fps), is_shown in zip(self.frames, self._lengths, self.is_shown)
+                       if found[side] and is_shown]
+            if seconds:
+                lines.append(f"{format_count(len(seconds), 'clip')}: T-pose at the {place} left out, "
+                             f"{np.median(seconds):.1f} s{' (median)' if len(seconds) > 1 else ''}")
+        if not all(self.is_shown):
+            lines.append(f"{format_count(self.is_shown.count(False), 'clip')} left out: nothing but a T-pose")
+        return lines
+
+
+def _shows_act(row: ClipAnnotation, t_pose_frames: tuple[int, int], count: int) -> bool:
+    """Whether a row of a clip of `count` frames names an act other than locomotion whose key moment or middle lies in a
+    T-pose.
+    """
+    middle = 0.5 * (row.start + row.end) if row.key is None else row.key
+    is_inside = middle < t_pose_frames[0] or middle >= count - t_pose_frames[1]
+    return is_inside and find_gait_label(row) is None
+
+
+def _cut_rows(rows: Sequence[ClipAnnotation], first: int, last: int) -> tuple[ClipAnnotation, ...]:
+    """Cut rows to the frames `first` to `last`, but not their key moments."""
+    found = []
+    for row in rows:
+        low, high = (first, last) if row.key is None else (min(first, row.key), max(last, row.key))
+        row = replace(row, start=max(row.start, low), end=min(row.end, high))
+        found += [row] if row.start <= row.end else []
+    return tuple(found)

@@ -177,7 +177,8 @@ def sample_upright_example(clips: Sequence) -> Motion:
     `motion.retargeting.neutral` uses the most upright of them. A single recording of a run leans, and synthetic running
     would lean twice.
     """
-    return sample_each_second(clip.motion for clip in clips if not clip.mirrored)
+    return sample_each_second(clip.motion for clip in clips
+                              if not clip.mirrored and clip.t_pose_frames[0] < len(clip.motion))
 
 
 def sample_each_second(motions: Iterable[Motion]) -> Motion:

@@ -22,6 +22,7 @@ STAND_SPEED = 0.2  # m/s that a clip of a stand never exceeds
 SLOT = 8  # output frames of a usual slot
 PLAYBACK_RATES = np.array([0.875, 0.9375, 1.0, 1.0625, 1.125])  # playback rates that are tried
 MOST_STRANGE = 3.0  # radii beyond the region of normal locomotion at which the cost stops growing
+_SHOWN_FASTEST = int(np.ceil(SLOT * PLAYBACK_RATES[-1]))  # library frames that a usual slot shows at most
 BUCKET = 40  # library frames that count as one for replayed stretches
 JERK_REACH = 8  # frames to either side over which the jerk of a transition is measured
 _SPEED_CLASSES = (1.0, 2.0, 3.0, 4.5)  # m/s between the classes in which jerk is compared
@@ -155,7 +156,8 @@ class CandidateIndex:
         speed, turn, lasts = map(np.stack, zip(*(compute_speed_and_turn(library, rate, count)
                                                  for rate in PLAYBACK_RATES)))
         self.speed, self.turn = speed.astype(np.float32), turn.astype(np.float32)
-        self.valid = lasts & allowed[library.frames.clip[count:]]
+        is_t_pose = compute_running_maximum(library.shows_t_pose, 0, _SHOWN_FASTEST)
+        self.valid = lasts & (allowed[library.frames.clip] & ~is_t_pose)[count:]
         usable = np.flatnonzero(self.valid)
         number, frame = np.divmod(usable[np.argsort(self.speed.ravel()[usable], kind="stable")], speed.shape[1])
         self.by_speed = number * len(self.frames) + frame + count
