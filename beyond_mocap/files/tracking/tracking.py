@@ -249,7 +249,7 @@ def _compute_key(feed: Feed, pitch: tuple[float, float] | None) -> str:
     digest = hashlib.sha256(f"{_CACHE_VERSION} {feed.provider.name} {pitch} {feed.is_meta_chosen}".encode())
     for file in (*feed.tracking, *feed.meta):
         with open_file(file, f"a file of {feed.provider.title}") as stream:
-            digest.update(hashlib.file_digest(stream, "sha256").digest())
+            digest.update(hashlib.file_digest(stream, "sha256").digest())  # type: ignore[arg-type]  # has readinto
     return digest.hexdigest()[:40]
 
 

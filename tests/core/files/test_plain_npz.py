@@ -1,4 +1,4 @@
-"""Archives come back as written; of one that states false sizes, or unpacks to more than it may, nothing is unpacked."""
+"""Archives come back as written; one that states false sizes or unpacks to more than it may is refused before that."""
 
 import io
 import struct
