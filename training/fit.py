@@ -10,8 +10,6 @@ from __future__ import annotations
 import json
 import os
 import time
-import zipfile
-import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -25,6 +23,7 @@ import optax
 
 from beyond_mocap.base.errors import InputError, UserCancelledError
 from beyond_mocap.files.atomic import atomic_path
+from beyond_mocap.files.plain_npz import read_own_arrays
 
 from .config import TrainingConfig
 
@@ -317,15 +316,14 @@ def read_progress(path: Path) -> Checkpoint:
     """
     check_checkpoint(path)
     try:
-        with np.load(path, allow_pickle=False) as file:
-            header = json.loads(str(file["told"][()]))
-            losses = tuple(float(one) for one in file["losses"])
-            leaves = [file[name] for name in sorted(name for name in file.files if name.startswith("leaf_"))]
+        arrays = read_own_arrays(path, "a checkpoint")
+        header = json.loads(str(arrays["told"][()]))
+        losses = tuple(float(one) for one in arrays["losses"])
+        leaves = [arrays[name] for name in sorted(name for name in arrays if name.startswith("leaf_"))]
         version, epoch, seconds, trained, choice = (header[name] for name in ("version", "epoch", "seconds",
                 "fits", "choice"))
-    except (ValueError, KeyError, TypeError, EOFError, OSError, zipfile.BadZipFile, zlib.error,
-            NotImplementedError, RuntimeError, AttributeError) as error:
-        raise InputError(path, f"is not a readable checkpoint ({type(error).__name__})", "", NEXT_STEP) from None
+    except (InputError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        raise InputError(path, "is not a readable checkpoint", "", NEXT_STEP) from None
     if version != VERSION:
         raise InputError(path, f"version {version}", f"version {VERSION}", NEXT_STEP)
     return Checkpoint(leaves, int(epoch), float(seconds), losses, trained, EpochChoice(**choice))

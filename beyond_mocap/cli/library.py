@@ -167,7 +167,8 @@ def run_learning(options, reporter: ProgressReporter) -> None:
     if options.propose and options.propose.name == TABLE_NAME and options.propose.exists():
         problem = "already has labels, which would be lost"
         raise InputError(options.propose, problem, "a new file", "choose another name, then merge the rows")
-    check_outputs(options.learn, options.propose, reserved=(options.learned,), library=options.library)
+    check_outputs(options.learn, options.propose, reserved=(options.learned,), library=options.library,
+                  labels=options.propose)
     model = classifier.read_classifier(options.learned) if options.learned else None
     if options.learn:
         examples = read_examples(options.library, options.unit, reporter.show_progress, cache_dir=options.cache,

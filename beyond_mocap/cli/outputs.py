@@ -161,19 +161,22 @@ def write_bvh(take, out: Path, above: Sequence = ()) -> None:
     bvh.write_bvh(out, take.motion, BvhForm(above=tuple(above)))
 
 
-def check_outputs(*paths: Path | None, reserved: tuple[Path | None, ...] = (), library: Path | None = None) -> None:
+def check_outputs(*paths: Path | None, reserved: tuple[Path | None, ...] = (), library: Path | None = None,
+                  labels: Path | None = None) -> None:
     """Check before the work that every output can be written and that no two paths are the same file.
 
     Args:
         paths: the output files; None is skipped.
         reserved: files that must not be overwritten, such as the inputs; None is skipped.
-        library: a folder whose recordings, labels and balls must not be overwritten; None for none.
+        library: a folder whose recordings, labels and balls must not be overwritten, and where no output may have the
+            name of labels or a ball that do not exist yet; None for none.
+        labels: one of the paths, a table of labels, which may become a new one of the library; None for none.
     Raises:
         InputError: for the first path that fails.
     """
     used = {path.resolve() for path in reserved if path is not None}
-    is_any_there = any(path.is_file() for path in filter(None, paths))
-    recorded = _identify_library_files(library) if library is not None and is_any_there else set()
+    is_listed = any(path.is_file() or path.suffix in (".txt", ".csv") for path in filter(None, paths))
+    recorded = _identify_library_files(library, labels) if library is not None and is_listed else set()
     for path in filter(None, paths):
         resolved = path.resolve()  # a link is written where it leads
         folder = resolved.parent
@@ -189,19 +192,28 @@ def check_outputs(*paths: Path | None, reserved: tuple[Path | None, ...] = (), l
             problem = "is both an output and another file of the command"
             raise InputError(path, problem, "different files", "rename one of them")
         used.add(resolved)
-        if recorded and path.exists() and identify_file(path) in recorded:
+        if path.exists() and identify_file(path) in recorded:
             raise InputError(path, f"is a file of the library {library}", "another file", "choose another name")
+        if not path.exists() and os.path.normcase(resolved) in recorded:
+            raise InputError(path, f"would be read as labels or as a ball of the library {library}", "another file",
+                             "choose another name")
 
 
-def _identify_library_files(library: Path) -> set[tuple[int, int] | str]:
-    """Identify the recordings, labels and balls of a library, also where links lead to them."""
-    from ..library.scan import find_recordings, find_tables
+def _identify_library_files(library: Path, labels: Path | None) -> set[tuple[int, int] | str]:
+    """Identify the recordings, labels and balls of a library, also where links lead to them; labels and balls that do
+    not exist by their paths, without the table that `labels` becomes.
+    """
+    from ..library.scan import TABLE_NAME, find_recordings, list_table_places
 
     found = find_recordings(library)
-    stems = [os.path.splitext(path)[0] for path in found]
-    beside = [stem + ending for stem in stems for ending in (".txt", ".ball.csv")]
-    files = [*map(str, found), *filter(os.path.exists, beside), *map(str, find_tables(library, found))]
-    return {identify_file(path) for path in files}
+    beside = [os.path.splitext(path)[0] + ending for path in found for ending in (".txt", ".ball.csv")]
+    files = [*map(str, found), *beside, *map(str, list_table_places(library, found))]
+    folders = {folder: os.path.realpath(folder) for folder in set(map(os.path.dirname, files))}
+    missing = {os.path.normcase(os.path.join(folders[os.path.dirname(path)], os.path.basename(path)))
+               for path in files if not os.path.exists(path)}
+    if labels is not None and labels.name == TABLE_NAME:
+        missing.discard(os.path.normcase(labels.resolve()))
+    return {*map(identify_file, filter(os.path.exists, files)), *missing}
 
 
 def add_take_files(verb) -> None:

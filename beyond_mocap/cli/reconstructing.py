@@ -261,7 +261,7 @@ def build_settings(options):
     values = option_values(ReconstructSettings, options, "markers")
     if _names_throw(options.words) and options.release == "auto":
         values["release"] = "yes"
-    values["marker_set"] = options.marker_set and choose_set(options.marker_set)
+    values["marker_set"] = None if options.marker_set is None else choose_set(options.marker_set)
     return ReconstructSettings(**values)
 
 

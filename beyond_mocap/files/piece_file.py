@@ -15,8 +15,10 @@ import numpy as np
 from ..base.digest import hex_digest
 from ..base.errors import InputError
 from .atomic import atomic_write
+from .plain_npz import HEADER, read_own_arrays
 
-_HEADER, _DIGEST = "header", "digest"
+_DIGEST = "digest"
+_MAX_BYTES = 256 * 1024 * 1024  # of a piece's arrays; the largest so far have some
 
 Result = TypeVar("Result")
 
@@ -32,7 +34,7 @@ def write_piece_file(path: Path, header: object, arrays: Mapping[str, np.ndarray
         InputError: if the file cannot be written.
     """
     text = json.dumps(header).encode()
-    stored = {_HEADER: np.frombuffer(text, np.uint8),
+    stored = {HEADER: np.frombuffer(text, np.uint8),
               _DIGEST: np.frombuffer(_compute_digest(text, arrays).encode(), np.uint8)}
     out = io.BytesIO()
     np.savez_compressed(out, **stored, **arrays)
@@ -85,11 +87,10 @@ def read_piece_file(path: Path) -> tuple | None:
         The header and the arrays by name; None if the file is missing, damaged or altered.
     """
     try:
-        with np.load(path, allow_pickle=False) as stored:
-            arrays = {name: stored[name] for name in stored.files}
-        text, digest = arrays.pop(_HEADER).tobytes(), arrays.pop(_DIGEST).tobytes()
+        arrays = read_own_arrays(path, "a piece of work", _MAX_BYTES)
+        text, digest = arrays.pop(HEADER).tobytes(), arrays.pop(_DIGEST).tobytes()
         return (json.loads(text), arrays) if digest == _compute_digest(text, arrays).encode() else None
-    except Exception:  # a damaged file can raise any error of zipfile, zlib and numpy
+    except (InputError, KeyError, ValueError, RecursionError):  # no text, or none of JSON
         return None
 
 

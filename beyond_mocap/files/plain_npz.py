@@ -1,4 +1,6 @@
-"""Read an .npz as plain arrays and one text; nothing in it is executed, and stated sizes are verified."""
+"""Read an .npz as plain arrays and one text; nothing in it is executed, and stated sizes are verified before it is
+unpacked.
+"""
 
 from __future__ import annotations
 
@@ -27,6 +29,11 @@ _READ_ERRORS = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, OSError,
                 TypeError, AttributeError, NotImplementedError, RuntimeError, OverflowError, MemoryError, SyntaxError,
                 tokenize.TokenError)  # fmt: skip
 """Errors of zipfile and numpy for truncated, damaged or malicious files."""
+_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+"""Those of numpy; zipfile unpacks bzip2 and LZMA whole, of whatever size, before it looks at a limit."""
+_BLOCK = 1 << 18  # bytes that are unpacked at once
+_MAX_START = 1 << 14  # bytes before an array's values; numpy's own limit is 10,000 and some
+_OWN_KINDS = "biufU"  # kinds of types in arrays of the program's own files
 
 
 def read_plain_arrays(
@@ -53,7 +60,7 @@ def read_plain_arrays(
             raise InputError(_WHOLE, next(found, "an .npz with other content"), kind, "choose another file")
         if len(set(names)) < len(names):
             raise InputError("the arrays", "two have the same name", kind, "choose another file")
-        return {name: _read_array(archive.read(member), name, types) for name, member in zip(names, members)}
+        return {name: _read_array(_unpack(archive, member), name, types) for name, member in zip(names, members)}
 
 
 def read_named_arrays(path: Path, kind: str, types: tuple[np.dtype, ...], max_bytes: int,
@@ -72,8 +79,28 @@ def read_named_arrays(path: Path, kind: str, types: tuple[np.dtype, ...], max_by
     """
     with open_file(path, kind) as file, _open_archive(file, kind, max_bytes, str(path)) as archive:
         found = {member.filename.removesuffix(".npy"): member for member in archive.infolist()}
-        return {name: _read_array(archive.read(found[name]), f"{path}: {name}", types, is_finite)
+        return {name: _read_array(_unpack(archive, found[name]), f"{path}: {name}", types, is_finite)
                 for name in names if name in found}
+
+
+def read_own_arrays(source: Path | bytes, kind: str, max_bytes: int | None = None) -> dict[str, np.ndarray]:
+    """Read all arrays of a file that this program wrote: numbers, also NaN, and texts.
+
+    Args:
+        source: the file, or its bytes.
+        kind: what it should be, for messages.
+        max_bytes: largest total size of its arrays; None where they are stored as they are: that of the file.
+    Returns:
+        Name -> read-only array.
+    Raises:
+        InputError: if it is missing, damaged or no zip of such arrays.
+    """
+    place = _WHOLE if isinstance(source, bytes) else str(source)
+    with io.BytesIO(source) if isinstance(source, bytes) else open_file(source, kind) as file:
+        size = file.seek(0, os.SEEK_END) if max_bytes is None else max_bytes
+        with _open_archive(file, kind, size, place) as archive:
+            return {name: _read_array(_unpack(archive, member), name, is_finite=False)
+                    for member in archive.infolist() for name in [member.filename.removesuffix(".npy")]}
 
 
 def list_arrays(path: Path) -> frozenset[str]:
@@ -117,22 +144,40 @@ def _open_archive(source, kind: str, max_bytes: int, place: str = _WHOLE) -> Ite
                          "copy it again or choose another file") from None  # fmt: skip
 
 
-def _read_array(data: bytes, name: str, types: tuple[np.dtype, ...], is_finite: bool = True) -> np.ndarray:
-    """Read one array from the bytes of a .npy.
-
-    Only plain numbers of exactly the stated count are accepted, so neither objects nor false sizes are trusted.
+def _unpack(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> np.ndarray:
+    """Unpack a member to read-only bytes (N,), never more than its stated size N: where it has others, its checksum
+    differs.
     """
-    handle = io.BytesIO(data)
+    if member.compress_type not in _METHODS:
+        raise NotImplementedError(f"compressed by method {member.compress_type}")
+    data, place = np.empty(member.file_size, np.uint8), 0
+    with archive.open(member) as file:
+        while block := file.read(min(_BLOCK, len(data) - place)):  # without a number, zipfile unpacks all at once
+            data[place : place + len(block)] = np.frombuffer(block, np.uint8)
+            place += len(block)
+    data.setflags(write=False)
+    return data[:place]
+
+
+def _read_array(data: np.ndarray, name: str, types: tuple[np.dtype, ...] | None = None,
+                is_finite: bool = True) -> np.ndarray:
+    """Read one array from the bytes of a .npy, without a copy; types: None for those of the program's own files.
+
+    Only plain values of exactly the stated count are accepted, so neither objects nor false sizes are trusted.
+    """
+    handle = io.BytesIO(data[:_MAX_START].tobytes())
     version = np.lib.format.read_magic(handle)
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     shape, fortran, dtype = read(handle)
-    if dtype not in types and not (name == HEADER and dtype == np.uint8):
-        expected = ", ".join(str(each) for each in types)
-        raise InputError(name[-200:], f"values of type {str(dtype)[:40]}", f"one of {expected}")
-    values = data[handle.tell() :]
-    if any(size < 0 for size in shape) or math.prod(shape) * dtype.itemsize != len(values):
-        raise InputError(name[-200:], f"{len(values)} bytes for shape {str(shape)[:40]}", "the shape's number of bytes")
-    array = np.frombuffer(values, dtype).reshape(shape, order="F" if fortran else "C")
+    is_known = dtype.kind in _OWN_KINDS and dtype.isnative if types is None else dtype in types
+    if not is_known and not (name == HEADER and dtype == np.uint8):
+        expected = f"one of {', '.join(map(str, types))}" if types else "numbers or text"
+        raise InputError(name[-200:], f"values of type {str(dtype)[:40]}", expected)
+    start = handle.tell()
+    count = len(data) - start
+    if any(size < 0 for size in shape) or math.prod(shape) * dtype.itemsize != count:
+        raise InputError(name[-200:], f"{count} bytes for shape {str(shape)[:40]}", "the shape's number of bytes")
+    array = np.frombuffer(data, dtype, offset=start).reshape(shape, order="F" if fortran else "C")
     if is_finite and dtype.kind == "f" and not np.isfinite(array).all():
         raise InputError(name[-200:], "NaN or infinite values", "finite numbers", "create the file again")
     return array

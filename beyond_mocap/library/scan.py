@@ -142,8 +142,8 @@ def find_readable_clips(folder: str | Path, place: str | Path,
     return ready, conversions, describe_waiting(waiting)
 
 
-def find_tables(folder: Path, clips: list[Path]) -> list[Path]:
-    """Find the `annotations.csv` files that may apply to `clips`.
+def list_table_places(folder: Path, clips: list[Path]) -> list[Path]:
+    """List the `annotations.csv` files that may apply to `clips`, whether they exist or not.
 
     From each clip's folder up to the library's top, and in the folder above that, since a library is often one folder
     of a larger collection.
@@ -153,7 +153,7 @@ def find_tables(folder: Path, clips: list[Path]) -> list[Path]:
     folders = {place for home in clip_folders for place in (home, *home.parents) if place == folder
                or folder in place.parents}
     folders |= {folder, _to_absolute(folder).parent}
-    return sorted(place / TABLE_NAME for place in folders if (place / TABLE_NAME).is_file())
+    return sorted(place / TABLE_NAME for place in folders)
 
 
 def _to_absolute(path: Path) -> Path:
@@ -169,7 +169,7 @@ class Annotations:
         """Read every table that may apply, without the rows that `skips` selects (`read_annotation_csv`); InputError
         for a broken one.
         """
-        tables = find_tables(folder, clips)
+        tables = [table for table in list_table_places(folder, clips) if table.is_file()]
         self.tables = {_to_absolute(table.parent): annotation.read_annotation_csv(table, skips) for table in tables}
 
     def read_rows(self, clip: Path, fps: float) -> tuple[annotation.ClipAnnotation, ...]:

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..files.atomic import atomic_write
+from ..files.plain_npz import read_own_arrays
 from ..library.library import Library
 
 # raised whenever the analysis or the stored arrays change
@@ -33,10 +34,9 @@ def load_arrays(library: Library, name: str) -> dict[str, np.ndarray] | None:
         return None
     folder, key = library.cache_location
     try:
-        with np.load(Path(folder) / f"{name}.npz", allow_pickle=False) as arrays:
-            stored = {part: arrays[part] for part in arrays.files}
-        return stored if bytes(stored.pop("of").tobytes()) == _encode_key(key) else None
-    except Exception:  # a damaged file can raise any error of zipfile and numpy
+        stored = read_own_arrays(Path(folder) / f"{name}.npz", "hits of a library")
+        return stored if stored.pop("of").tobytes() == _encode_key(key) else None
+    except (InputError, KeyError):
         return None
 
 

@@ -257,7 +257,7 @@ def measure_knee_jerk(source, edited, frames: np.ndarray) -> dict:
         edited: the motion on the new path.
         frames: (T,) nearest source frames.
     Returns:
-        Ratios of the 99th percentiles and of the largest values.
+        Ratios of the 99th percentiles and of the largest values; None where the recording's is 0.
     """
     body = identify_joints(source.motion.skeleton)
     knees = [body.left.lower_leg, body.right.lower_leg]
@@ -267,8 +267,9 @@ def measure_knee_jerk(source, edited, frames: np.ndarray) -> dict:
     source_jerk = source_jerk[used[used < len(source_jerk)]]
     if not len(edited_jerk) or not len(source_jerk):
         return {"p99": None, "max": None}
-    return {"p99": float(np.percentile(edited_jerk, 99) / np.percentile(source_jerk, 99)),
-            "max": float(edited_jerk.max() / source_jerk.max())}
+    edited_pair, source_pair = (np.percentile(jerk, (99, 100)) for jerk in (edited_jerk, source_jerk))
+    return {name: float(one / other) if other else None
+            for name, one, other in zip(("p99", "max"), edited_pair, source_pair)}
 
 
 def _compute_mean(values: np.ndarray) -> float:

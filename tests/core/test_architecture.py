@@ -195,6 +195,14 @@ def test_nothing_is_unpickled_or_evaluated():
     assert offences == []
 
 
+def test_archives_of_others_have_one_reader():
+    """numpy's and zipfile's own unpack whatever a file says; maps, shipped files and a run's own pictures remain."""
+    kept = {"beyond_mocap/files/motion_file.py", "beyond_mocap/appearance/template.py", "scene/stage/pictures.py"}
+    readers = {(path.as_posix(), find_call) for path in list_sources(CORE, "scene", "operators", "panels", "training")
+               for find_call in re.findall(r"\bnp\.load\(|\bZipFile\(", (TOP / path).read_text("utf-8"))}
+    assert readers == {*((path, "np.load(") for path in kept), ("beyond_mocap/files/plain_npz.py", "ZipFile(")}
+
+
 def test_the_extension_can_be_read_without_blender():
     path = pathlib.Path("__init__.py")
     imported = read_imports(path, (TOP / path).read_text("utf-8"))

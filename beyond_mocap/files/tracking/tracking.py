@@ -17,12 +17,14 @@ from pathlib import Path
 
 import numpy as np
 
+from ...base.content import open_file
 from ...base.errors import InputError, describe_damage, format_count
 from ...base.user_folders import find_user_cache
 from ...motion.skeleton import freeze_array
 from ...motion.track import Track
 from ...motion.track.match_data import REFEREE, Match, MatchPlayer, Team, describe_presence
 from ..atomic import atomic_write, remove_abandoned
+from ..plain_npz import read_own_arrays
 from ..tables import parse_number, read_rows
 from . import match_arrays
 from .body_angles import find_headings
@@ -245,19 +247,20 @@ def _compute_key(feed: Feed, pitch: tuple[float, float] | None) -> str:
     """Compute a key from the files' contents, independent of their names."""
     digest = hashlib.sha256(f"{_CACHE_VERSION} {feed.provider.name} {pitch} {feed.is_meta_chosen}".encode())
     for file in (*feed.tracking, *feed.meta):
-        with open(file, "rb") as stream:
-            digest.update(hashlib.file_digest(stream, "sha256").digest())
+        with open_file(file, f"a file of {feed.provider.title}") as stream:
+            digest.update(hashlib.file_digest(stream, "sha256").digest())  # type: ignore[arg-type]  # has readinto
     return digest.hexdigest()[:40]
 
 
 def _load_cache(cache: Path) -> dict[str, np.ndarray] | None:
     """Load the arrays from the cache; None if they are missing or damaged."""
     try:
-        with np.load(cache, allow_pickle=False) as stored:
-            arrays = {name: stored[name] for name in _ARRAY_NAMES}
+        arrays = read_own_arrays(cache, "a match in the cache")
         with contextlib.suppress(OSError):
             os.utime(cache)  # matches in use stay the longest
-    except Exception:  # zipfile, zlib and numpy raise many kinds of errors for damaged files
+    except InputError:
+        return None
+    if not arrays.keys() >= {*_ARRAY_NAMES}:
         return None
     count, player_count = arrays["times"].size, arrays["players"].size // 5
     shapes = {"times": (count,), "positions": (player_count, count, 2), "ball": (count, 3), "pitch": (4,),

@@ -19,6 +19,7 @@ from ...base.content import read_bytes
 from ...base.errors import InputError, format_count
 from ...base.time_series import find_runs
 from ...files.atomic import atomic_write
+from ...files.plain_npz import HEADER, read_own_arrays
 from ...motion.motion import Motion
 from ..label_sources import LEARNED, Proposal
 from .details import Details
@@ -39,7 +40,8 @@ _STRIKE_SEARCH = 0.12  # seconds around a candidate in which its strike is searc
 
 _FILE_VERSION = 1
 
-_MAX_BYTES = 256 * 1024 * 1024
+_KIND = "a file of learned labels"
+_MAX_BYTES = 256 * 1024 * 1024  # of the file, and of its arrays
 _NEXT_STEP = "learn from annotated clips again"
 
 
@@ -288,7 +290,7 @@ def write_classifier(path: str | os.PathLike, known: Classifier) -> None:
         for group, plane in enumerate(act.details.planes):
             arrays[f"{number}.plane.{group}"] = plane
     header = {"version": _FILE_VERSION, "clips": known.clips, "acts": [_describe_act(act) for act in known.acts]}
-    arrays["header"] = np.frombuffer(json.dumps(header).encode(), np.uint8)
+    arrays[HEADER] = np.frombuffer(json.dumps(header).encode(), np.uint8)
     out = io.BytesIO()
     np.savez_compressed(out, **arrays)
     atomic_write(path, out.getvalue())
@@ -297,23 +299,20 @@ def write_classifier(path: str | os.PathLike, known: Classifier) -> None:
 def read_classifier(path: str | os.PathLike) -> Classifier:
     """Read a classifier; InputError where the file is missing, damaged, or of another version."""
     if not os.path.exists(path):
-        raise InputError(path, "no such file", "a file of learned labels", _NEXT_STEP)
+        raise InputError(path, "no such file", _KIND, _NEXT_STEP)
+    content = read_bytes(path, _KIND, _MAX_BYTES)
     try:
-        content = io.BytesIO(read_bytes(path, "a file of learned labels", _MAX_BYTES))
-        with np.load(content, allow_pickle=False) as stored:
-            arrays = {name: stored[name] for name in stored.files}
-        header = json.loads(arrays["header"].tobytes())
+        arrays = read_own_arrays(content, _KIND, _MAX_BYTES)
+        header = json.loads(arrays[HEADER].tobytes())
         version = header["version"]
-    except InputError:
-        raise
-    except Exception:  # a damaged file can raise any of zipfile's, numpy's and json's exceptions
-        raise InputError(path, "a file that cannot be read", "a file of learned labels", _NEXT_STEP) from None
+    except (InputError, LookupError, TypeError, ValueError, RecursionError):
+        raise InputError(path, "a file that cannot be read", _KIND, _NEXT_STEP) from None
     if version != _FILE_VERSION:
         raise InputError(path, f"version {version!r}", f"version {_FILE_VERSION}", _NEXT_STEP)
     try:
         return _restore_classifier(header, arrays)
     except (LookupError, TypeError, ValueError, AttributeError, OverflowError):
-        raise InputError(path, "inconsistent or invalid numbers", "a file of learned labels", _NEXT_STEP) from None
+        raise InputError(path, "inconsistent or invalid numbers", _KIND, _NEXT_STEP) from None
 
 
 def _describe_act(act: Act) -> dict:

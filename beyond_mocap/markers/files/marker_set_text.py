@@ -37,7 +37,7 @@ def choose_set(name: str) -> MarkerSet:
     shipped = {one.name: one for one in read_shipped_sets()}
     if name.strip().lower() in shipped:
         return shipped[name.strip().lower()]
-    if not Path(name).exists():
+    if not os.path.exists(name):  # an empty name is no file, but a `Path` of it is the current folder
         found = f"no marker set {name[:60]!r}"
         raise InputError("marker set", found, f"one of {', '.join(shipped)}, or a file", "check the name")
     return read_marker_set(name)

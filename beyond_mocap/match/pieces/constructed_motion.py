@@ -103,7 +103,7 @@ class ConstructedMotion:
             return None
         try:
             return [span.load_take(self._job.library.skeleton) for span in self.find_spans(player, start, end)]
-        except (OSError, ValueError):
+        except (InputError, OSError, ValueError):
             return None
 
     def remove(self) -> None:

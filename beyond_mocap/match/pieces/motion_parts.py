@@ -18,6 +18,7 @@ import numpy as np
 
 from ...annotation import KeyMoment, Span, Timeline
 from ...base.errors import TimedMessage, line_spans
+from ...files.plain_npz import HEADER, read_own_arrays
 from ...library.library import Library
 from ...motion.motion import Motion
 from ...motion.skeleton import Skeleton
@@ -85,8 +86,7 @@ class MotionSpan:
     parts: tuple[tuple[Content, int, int], ...]
 
     def load_take(self, skeleton: Skeleton) -> Take:
-        """Load what `player_motion.construct_player` constructs for the span; OSError or ValueError if a file is
-        damaged.
+        """Load what `player_motion.construct_player` constructs for the span; InputError if a file is damaged.
         """
         size = measure_size(self.plan, skeleton)
         own = skeleton if size == 1.0 else skeleton.scale(size)
@@ -128,9 +128,9 @@ def load_part(content: Content, skeleton: Skeleton) -> Take:
     Returns:
         The take, without a plan.
     """
-    with np.load(io.BytesIO(content) if isinstance(content, bytes) else content, allow_pickle=False) as file:
-        header, numbers = json.loads(file["header"].tobytes()), file["numbers"]
-    arrays = _split_arrays(header["arrays"], numbers)
+    stored = read_own_arrays(content, "the motion of a window")
+    header = json.loads(stored[HEADER].tobytes())
+    arrays = _split_arrays(header["arrays"], stored["numbers"])
     words = [tuple(one) for one in header["words"]]
     ball = [arrays.get(f"ball.{name}") for name in _BALL]
     return Take(
@@ -147,7 +147,6 @@ def load_part(content: Content, skeleton: Skeleton) -> Take:
 def _split_arrays(rows: list, numbers: np.ndarray) -> dict[str, Any]:
     """Split the bytes of all arrays, one behind the other, into read-only arrays by name; rows: (name, type, shape)."""
     arrays: dict[str, Any] = {}
-    numbers.setflags(write=False)
     place = 0
     for name, kind, shape in rows:
         size = math.prod(shape) * np.dtype(kind).itemsize

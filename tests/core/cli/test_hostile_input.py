@@ -169,6 +169,25 @@ def test_no_output_takes_the_place_of_a_librarys_recording_or_labels(command, na
     assert status == 2 and f"{name}: is a file of the library" in line and (tmp_path / name).read_bytes() == content
 
 
+@pytest.mark.parametrize("name", ["walk.txt", "walk.ball.csv", "annotations.csv", "sub/annotations.csv",
+                                  "../annotations.csv"])
+def test_no_output_becomes_labels_or_a_ball_of_a_library(name, run_line, tmp_path):
+    top = tmp_path / "library"
+    (top / "sub").mkdir(parents=True)
+    for place in (top / "walk.bvh", top / "sub" / "run.bvh"):
+        place.write_bytes(WALK.read_bytes())
+    (tmp_path / "link").symlink_to(top)
+    for library in (top, tmp_path / "link"):
+        status, line = run_line("library", library, "--report", top / name)
+        assert status == 2 and "would be read as labels or as a ball of the library" in line
+        assert not (top / name).exists()
+    check_outputs(tmp_path / "walk.txt", top / "else.ball.csv", library=top)
+    table = top / "annotations.csv"
+    check_outputs(None, table, library=top, labels=table)
+    with pytest.raises(InputError, match="would be read as labels"):
+        check_outputs(table, top / "walk.txt", library=top, labels=top / "walk.txt")
+
+
 def test_the_library_is_listed_once_for_all_outputs_that_exist(tmp_path, monkeypatch):
     outputs = [tmp_path / name for name in ("a.bvh", "b.json", "c.csv")]
     for path in outputs:
@@ -229,6 +248,12 @@ def test_proposed_labels_do_not_take_the_place_of_labels(run_line, tmp_path):
 def test_options_of_a_library_need_one(command, run_line, tmp_path):
     status, line = run_line(*command.format(clip=WALK, out=tmp_path / "r.bvh").split())
     assert status == 2 and "set without --library; expected a folder of" in line and line.endswith("add --library")
+
+
+def test_an_empty_marker_set_is_reported_as_none(run_line, tmp_path):
+    trial = TOP / "sample_blend" / "markers" / "walk.trc"
+    status, line = run_line("reconstruct", trial, "--out", tmp_path / "o.bvh", "--marker-set=")
+    assert status == 2 and "no marker set ''; expected one of" in line
 
 
 @pytest.mark.parametrize("option, said", [("--meta=--", "--meta: expected one argument"), ("--to=--", "expected one"),

@@ -204,6 +204,13 @@ def test_metrica_agrees_with_tracab_of_the_same_match(tmp_path):
     assert not any("105" in note for note in told.notes)
 
 
+def test_a_folder_in_the_place_of_a_file_is_named(tmp_path):
+    (tmp_path / "a.ball").mkdir()
+    one = feed.Feed(PROVIDERS["tracab"], (tmp_path / "a.ball",))
+    with pytest.raises(InputError, match="a.ball: is a folder; expected a file of TRACAB"):
+        tracking._compute_key(one, None)
+
+
 def test_a_changed_file_or_a_damaged_cache_is_read_anew(tmp_path):
     pytest.importorskip("kloppy")
     file, players = made_tracab(tmp_path)

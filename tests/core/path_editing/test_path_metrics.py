@@ -11,7 +11,7 @@ from beyond_mocap.path_editing.path_edit import edit_path
 from beyond_mocap.path_editing.path_edit_settings import PathEditSettings
 from beyond_mocap.path_editing.path_edit_source import prepare_source
 from beyond_mocap.path_editing.path_line import fit_line
-from beyond_mocap.path_editing.path_metrics import measure_path_edit
+from beyond_mocap.path_editing.path_metrics import measure_knee_jerk, measure_path_edit
 from beyond_mocap.synthetic.gait import build_gait
 
 RIGID = PathEditSettings(plant=False, lean=False)
@@ -45,6 +45,13 @@ def test_its_own_path_gives_the_recordings_own_figures(source):
     assert got["ground_mm"]["standing_p95"] == pytest.approx(got["ground_mm"]["source_standing_p95"], abs=1.0)
     assert got["knee_jerk_ratio"]["p99"] == pytest.approx(1.0, abs=1e-3)
     assert got["ik_miss_share"] == 0.0 and got["seam_jerk"] == {"seams": 0, "max": None, "median": None}
+
+
+def test_beside_a_recording_that_stands_still_a_ratio_of_jerk_is_unknown():
+    pose = build_gait(0.0, 1.0, 30.0).frames(0, 1)
+    still = prepare_source(replace(pose, root_positions=np.repeat(pose.root_positions, 24, axis=0),
+                                   rotations=np.repeat(pose.rotations, 24, axis=0)), RIGID)
+    assert measure_knee_jerk(still, still, np.arange(24)) == {"p99": None, "max": None}
 
 
 def test_a_body_beside_the_path_is_measured_beside_it(source, path):
