@@ -55,7 +55,7 @@ def parse_timeline(text: str, where: str = "annotations", fps: float | None = No
         if tokens[0].lower() == "unit":
             unit = _parse_unit(tokens, place)
             continue
-        times = [_parse_seconds(token, unit, fps, start, place) for token in _list_leading_numbers(tokens, place)]
+        times = [_parse_seconds(token, unit, fps, start, place) for token in _list_leading_numbers(tokens, unit, place)]
         labels = tokens[len(times) :]
         if len(times) == 2:
             spans.append(_parse_span(times, labels, number, place))
@@ -106,12 +106,13 @@ def _parse_unit(tokens: list[str], place: str) -> str:
     return unit
 
 
-def _list_leading_numbers(tokens: list[str], place: str) -> list[str]:
+def _list_leading_numbers(tokens: list[str], unit: str, place: str) -> list[str]:
     """List the one or two numbers at the start of a line."""
     for token in tokens[:2]:
         if (seconds := _read_other_time(token)) is not None:
+            step = f"write seconds with a point: {_format_exact(seconds)}"
             raise InputError(place, f"{token!r} is not a time", _EXPECTED_FORM,
-                             f"write seconds with a point: {_format_exact(seconds)}")
+                             step if unit == "seconds" else "write the number of frames, or leave out 'unit frames'")
     if not NUMBER.fullmatch(tokens[0]):
         raise InputError(place, f"{tokens[0]!r} is not a time", _EXPECTED_FORM, "put the time first")
     numbers = [token for token in tokens[:3] if NUMBER.fullmatch(token)]
@@ -125,9 +126,9 @@ def _read_other_time(token: str) -> float | None:
     if not OTHER_TIME.fullmatch(token):
         return None
     seconds = 0.0
-    for part in token.replace(",", ".").split(":"):
+    for part in token.lstrip("+-").replace(",", ".").split(":"):
         seconds = 60.0 * seconds + float(part)
-    return seconds
+    return -seconds if token.startswith("-") else seconds
 
 
 def _parse_seconds(token: str, unit: str, fps: float | None, start: float, place: str) -> float:

@@ -27,7 +27,7 @@ from .vocabulary import (
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?f?", re.IGNORECASE)
 """What the text form reads as a time; no label may look like one."""
 
-OTHER_TIME = re.compile(r"\d+,\d+|(\d+:){1,2}\d\d([.,]\d+)?")
+OTHER_TIME = re.compile(r"[+-]?(\d+,\d+|(\d+:){1,2}\d\d([.,]\d+)?)")
 """Times that the text form refuses: with a decimal comma, or as minutes and seconds; no label may look like one."""
 
 EDGE_TOLERANCE = 0.1

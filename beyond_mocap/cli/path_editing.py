@@ -82,7 +82,7 @@ def run_path(options, reporter: ProgressReporter, writers: Mapping[str, Writer])
     reporter.check_cancelled()
     report = _build_report(source, edited, take, path, ground) if options.report else None
     reporter.check_cancelled()
-    notes = [f"{options.input}: {note}" for note in (*clip.notes, *_describe_raised_toes(source, ground))]
+    notes = [f"{options.input}: {note}" for note in (*clip.notes, *_describe_raised_toes(source, path, ground))]
     if options.out.suffix.lower() == ".bvh":
         notes += [f"{options.out}: {note}" for note in bvh.write_bvh(options.out, edited.motion, clip.form)]
     else:
@@ -94,12 +94,13 @@ def run_path(options, reporter: ProgressReporter, writers: Mapping[str, Writer])
           f"m{_describe_unit(clip, options)}")
 
 
-def _describe_raised_toes(source, ground) -> list[str]:
-    """Report where the toes of flat feet are above the ground, as in some recordings: in takes they are on it."""
+def _describe_raised_toes(source, path, ground) -> list[str]:
+    """Report where the toes of flat feet are above the path, as in some recordings: in takes they are on the ground."""
     from ..motion.contacts import measure_sole_height
 
     raised = source.sole - measure_sole_height(source.motion.skeleton) if source.has_legs else 0.0
-    if raised < _RAISED or ground is not None:
+    lowered = max(-float(path.coefficients[:, 2].min()), 0.0)
+    if raised - lowered < _RAISED or ground is not None:
         return []
     return [f"toes of flat feet are {100.0 * raised:.1f} cm above the ground, as recorded; in takes they are on it: "
             f"with z_m {-raised:.3f} in the path they are here too"]

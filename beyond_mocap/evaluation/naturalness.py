@@ -296,7 +296,8 @@ def measure_course_figures(courses: Sequence[BodyCourse], used: Sequence[np.ndar
     frames = sum(int(mask.sum()) for _, mask, _ in counted)
     drops = sum(int((mask & ~other)[find_pelvis_drops(course)].sum()) for course, mask, other in counted)
     off = _join(np.degrees(measure_facing_off_travel(course)[mask]) for course, mask, _ in counted)
-    slow = [(course, mask & ~other & (course.speed < SLOW_SPEED)) for course, mask, other in counted]
+    slow = [(course, mask & ~other & (course.speed < SLOW_SPEED) & postures.select_known(course.speed))
+            for course, mask, other in counted]
     strange = _join(postures.measure_strangeness(course.posture[mask], course.speed[mask]) for course, mask in slow)
     off = off[np.isfinite(off)]
     return {

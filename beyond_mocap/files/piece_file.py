@@ -18,7 +18,7 @@ from .atomic import atomic_write
 from .plain_npz import HEADER, read_own_arrays
 
 _DIGEST = "digest"
-_MAX_BYTES = 256 * 1024 * 1024  # of a piece's arrays; the largest so far have some
+_MAX_BYTES = 256 * 1024 * 1024  # of a piece's arrays; a larger one counts as missing
 
 Result = TypeVar("Result")
 

@@ -90,6 +90,11 @@ class Clip:
             return self.path
         return LANDING_FOLDER + self.path + ("" if self.path.lower().endswith(".bvh") else ".bvh")
 
+    @property
+    def is_t_pose(self) -> bool:
+        """Whether the recording shows nothing but a T-pose."""
+        return self.t_pose_frames[0] >= len(self.motion)
+
     def select_t_poses(self, frames: np.ndarray) -> np.ndarray:
         """Select those of `frames` (T,), in the clip's own rate, that lie in a T-pose or beside it: (T,) bool."""
         (start, end), margin = self.t_pose_frames, T_POSE_MARGIN * self.motion.fps

@@ -322,9 +322,12 @@ class Library:
 
     @property
     def unlabelled_notes(self) -> tuple[str, ...]:
-        """A line that names the recordings without labels, which are not used; empty where all have some."""
-        paths = [clip.path for clip in self.clips if not (clip.annotations or clip.mirrored or clip.is_synthetic)]
-        if not paths:
+        """A line that names the recordings without labels, which are not used; empty where all have some, or none had
+        and labels are proposed.
+        """
+        own = [clip for clip in self.clips if not (clip.mirrored or clip.is_synthetic)]
+        paths = [clip.path for clip in own if not (clip.annotations or clip.is_t_pose)]
+        if not paths or any(clip.has_proposed_labels for clip in own):
             return ()
         more = f" and {len(paths) - _NAMED_CLIPS} more" if len(paths) > _NAMED_CLIPS else ""
         verbs = ("has", "is") if len(paths) == 1 else ("have", "are")

@@ -137,7 +137,7 @@ def _grade_clip(clip: Clip, speed: float, jerk: float) -> tuple[int, tuple[str, 
     if clip.has_proposed_labels:
         details.append("labels: proposed")
     if not clip.annotations:
-        details.append("no labels: not used")
+        details.append("nothing but a T-pose: not used" if clip.is_t_pose else "no labels: not used")
     return max(marks), tuple(details)
 
 

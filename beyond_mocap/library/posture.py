@@ -134,18 +134,24 @@ class NormalPostures:
             posture: (T, K) of `compute_postures`.
             speed: (T,) m/s.
         Returns:
-            (T,) float32: 1 at the end of the region, up to which a frame belongs; 0 where no region judges that speed.
+            (T,) float32: 1 at the end of the region, up to which a frame belongs; 0 where no region
+            holds for that speed.
         """
         kind, out = np.digitize(speed, SPEED_EDGES), np.zeros(len(posture), np.float32)
         for k in np.unique(kind):
-            judge = self._find_judge(int(k))
-            if judge is None:
+            reference = self._find_reference(int(k))
+            if reference is None:
                 continue
-            middle, inverse, radius = self.regions[judge]
+            middle, inverse, radius = self.regions[reference]
             away = posture[kind == k] - middle
             squared = np.maximum(np.einsum("ij,ij->i", away @ inverse, away), 0.0)
             out[kind == k] = np.sqrt(squared) / (radius + BELONGING)
         return out
+
+    def select_known(self, speed: np.ndarray) -> np.ndarray:
+        """Select those of speeds (T,) m/s, as (T,) bool, at which the library knows how people move."""
+        known = [self._find_reference(k) is not None for k in range(len(SPEED_EDGES) + 1)]
+        return np.array(known)[np.digitize(speed, SPEED_EDGES)]
 
     def measure_parts(self, posture: np.ndarray, speed: np.ndarray) -> dict[str, tuple[float, np.ndarray]]:
         """Measure how unlike normal locomotion each part of the body is in postures of about one speed.
@@ -155,13 +161,13 @@ class NormalPostures:
             speed: (T,) m/s.
         Returns:
             Part of PARTS -> how far its mean squared Mahalanobis distance lies above what is expected, in standard
-            deviations, and its mean offset (k,) from the region's middle; empty where no region judges any of them.
+            deviations, and its mean offset (k,) from the region's middle; empty where no region holds for any of them.
         """
-        kinds = np.digitize((np.mean(speed), *speed), SPEED_EDGES)  # where none judges the mean, one judges a part
-        judges = [judge for k in kinds if (judge := self._find_judge(int(k))) is not None]
-        if not judges:
+        kinds = np.digitize((np.mean(speed), *speed), SPEED_EDGES)  # where the mean has no reference, a part may have
+        found = [one for k in kinds if (one := self._find_reference(int(k))) is not None]
+        if not found:
             return {}
-        middle, inverse, _ = self.regions[judges[0]]
+        middle, inverse, _ = self.regions[found[0]]
         away, covariance, found = posture - middle, np.linalg.inv(inverse), {}
         for part, columns in PARTS.items():
             own = away[:, columns]
@@ -171,9 +177,9 @@ class NormalPostures:
                 found[part] = (float(squared.mean() - count) / np.sqrt(2.0 * count), own.mean(axis=0))
         return found
 
-    def _find_judge(self, kind: int) -> int | None:
-        """Find the class whose region judges a class: itself, or else the next faster one of the same gait; None
-        without one.
+    def _find_reference(self, kind: int) -> int | None:
+        """Find the class with whose region a class is compared: itself, or else the next faster one of the same gait;
+        None without one.
 
         A walk's region calls all runs strange, a stand's all walks, and a jog's two thirds of the frames of sprints.
         """

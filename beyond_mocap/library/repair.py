@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import minimum_filter1d
 
-from ..annotation import ClipAnnotation
+from ..annotation import CONTINUOUS, DISCRETE, LOCOMOTION, ClipAnnotation
 from ..base.banded_least_squares import BandedLeastSquares
 from ..base.errors import InputError, format_count
 from ..base.time_series import find_runs
@@ -33,7 +33,8 @@ from ..motion.motion import Motion, forward_kinematics
 from ..motion.t_poses import find_t_poses
 from ..motion.track import smooth_zero_phase_hann
 from .clip import T_POSE_MARGIN
-from .library import find_gait_label
+
+_ACTS = (DISCRETE | CONTINUOUS) - {*LOCOMOTION, "turning"}  # labels that a T-pose may show
 
 # a rotation that jumps by more than this (radians) and by so many times what its neighbours move, and returns
 _POP = np.radians(12.0)
@@ -351,8 +352,8 @@ class TPoses:
             found = find_t_poses(motion)
         except InputError as error:
             raise InputError(path, str(error)) from None
-        if any(found) and any(_shows_act(row, found, len(motion)) for row in read_rows()):
-            found = 0, 0
+        if any(found):
+            found = _drop_acts(found, read_rows(), len(motion))
         self.frames.append(found)
         self._lengths.append((len(motion), motion.fps))
         first, end = found[0], len(motion) - found[1]
@@ -396,13 +397,16 @@ class TPoses:
         return lines
 
 
-def _shows_act(row: ClipAnnotation, t_pose_frames: tuple[int, int], count: int) -> bool:
-    """Whether a row of a clip of `count` frames names an act other than locomotion whose key moment or middle lies in a
-    T-pose.
+def _drop_acts(found: tuple[int, int], rows: Sequence[ClipAnnotation], count: int) -> tuple[int, int]:
+    """Drop the T-poses (number of frames at the start and the end of a clip of `count` frames) in which the key moment
+    or the middle of a row lies that names an act.
     """
-    middle = 0.5 * (row.start + row.end) if row.key is None else row.key
-    is_inside = middle < t_pose_frames[0] or middle >= count - t_pose_frames[1]
-    return is_inside and find_gait_label(row) is None
+    start, end = found
+    for row in rows:
+        if _ACTS & {*row.words}:
+            middle = 0.5 * (row.start + row.end) if row.key is None else row.key
+            start, end = start if middle >= start else 0, end if middle < count - end else 0
+    return start, end
 
 
 def _cut_rows(rows: Sequence[ClipAnnotation], first: int, last: int) -> tuple[ClipAnnotation, ...]:

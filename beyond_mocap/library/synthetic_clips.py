@@ -178,7 +178,7 @@ def sample_upright_example(clips: Sequence) -> Motion:
     would lean twice.
     """
     return sample_each_second(clip.motion for clip in clips
-                              if not clip.mirrored and clip.t_pose_frames[0] < len(clip.motion))
+                              if not clip.mirrored and not clip.is_t_pose)
 
 
 def sample_each_second(motions: Iterable[Motion]) -> Motion:

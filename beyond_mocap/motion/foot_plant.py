@@ -168,7 +168,8 @@ def plant_feet(
                                                            is_new, goals)
         ]
         drop = compute_pelvis_drop(feet, [goal for goal, _ in goals], spread, max_drop)
-        short = [measure_shortfall(foot, goal, drop) for foot, (goal, _) in zip(feet, goals)]
+        short = [measure_shortfall(replace(foot, weight=weight), goal, drop)
+                 for foot, weight, (goal, _) in zip(feet, weights, goals)]
         if attempt == _RELAX_ROUNDS or max(s.max(initial=0.0) for s in short) <= _SLIDE_TOLERANCE:
             break
         relaxed = [relax_stances(weight, foot.contact_weight > 0.0, s, fps)
@@ -303,7 +304,8 @@ def relax_stances(weight: np.ndarray, planted: np.ndarray, short: np.ndarray, fp
         short: (T,) m that the leg is too short.
         fps: frames per second.
     """
-    return relax_contact_weights(_trim_stances(weight, planted, short, fps), short)
+    trimmed = _trim_stances(weight, planted, short, fps)
+    return relax_contact_weights(trimmed, np.where(short > _SLIDE_TOLERANCE, short, 0.0))
 
 
 def _trim_stances(weight: np.ndarray, planted: np.ndarray, short: np.ndarray, fps: float) -> np.ndarray:

@@ -42,7 +42,7 @@ def find_t_poses(motion: Motion) -> tuple[int, int]:
         return 0, 0
     places = forward_kinematics(motion)[0]
     start, end = (_measure_first(one, body, motion.fps) for one in (places, places[::-1]))
-    if len(motion) - start - end < _LEAST_SECONDS * motion.fps:
+    if (start or end) and len(motion) - start - end < _LEAST_SECONDS * motion.fps:
         return len(motion), 0
     return start, end
 

@@ -118,7 +118,8 @@ def plant_feet_on_ground(skeleton: Skeleton, root: np.ndarray, rotations: np.nda
         placed_feet = [replace(foot, hip=foot.hip - first[:, None] * _UP) for foot in placed_feet]
         goals = [_compute_ankle_goal(foot, spread) for foot in placed_feet]
         drop = foot_plant.compute_pelvis_drop(placed_feet, [goal for goal, _ in goals], spread, most - FIRST_DROP)
-        lacking = [foot_plant.measure_shortfall(foot, goal, drop) for foot, (goal, _) in zip(placed_feet, goals)]
+        lacking = [foot_plant.measure_shortfall(replace(foot, weight=weight), goal, drop)
+                   for foot, weight, (goal, _) in zip(placed_feet, firm, goals)]
         if round_number == _ROUNDS or max(s.max(initial=0.0) for s in lacking) <= _SLIDES_FROM:
             break
         firm = [foot_plant.relax_stances(weight, foot.contact_weight > 0.0, s, fps)

@@ -25,7 +25,7 @@ BALL_COST = 1.0  # per radian beyond it, half of that from 3 m/s on
 PULL_COST = 0.02  # per radian to the ball, also within: where all cost alike, an edit far away would choose more often
 TRAVEL_COST = 6.0  # per radian beyond TRAVEL_LIMITS
 FORWARD_COST = 0.3  # per radian to travel and m/s above 0.6: forward is cheaper
-ALONE_COST = 1.0  # the same without a ball, up to 1.6 m/s: who has nothing to watch turns and walks back forward
+ALONE_COST = 1.0  # the same up to 1.6 m/s with no ball to watch, or only one at the feet: people turn, not back away
 SIDEWAYS_COST, SIDEWAYS_WIDTH = 2.5, np.radians(45.0)  # at a right angle to travel, and the width of that bell
 TURN_COST, TURN_RATE_COST, TURN_ANGLE_COST = 0.12, 0.08, 0.7  # per second of turning, per (pi / s)^2, per radian
 GIVEN_COST = 40.0  # per radian and second: given headings hold against all others
@@ -107,7 +107,8 @@ class _Bearings:
         positions: (D, 2) m.
         speed: (D,) m/s.
         travel: (D,) rad, direction of travel.
-        ball: (D,) rad, bearing of the ball or of the play, NaN where there is neither.
+        ball: (D,) rad, bearing of the ball or of the play; NaN where there is neither, or the ball is never far enough
+            to have a bearing.
     """
 
     times: np.ndarray

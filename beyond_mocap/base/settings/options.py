@@ -50,7 +50,8 @@ def name_options(line: str, *groups: str) -> str:
     Returns:
         The same with "use TITLE" and "a higher TITLE" as the command line has them.
     """
-    for row in (row for group in groups for row in list_settings(group) if row.option):
+    rows = [row for group in groups for row in list_settings(group) if row.option]
+    for row in sorted(rows, key=lambda one: -len(one.title)):  # a title may begin another one
         option = row.option.split()[0]
         use = "leave out" if row.kind is bool and row.default else "use"
         line = line.replace(f"use {row.title}", f"{use} {option}")

@@ -156,6 +156,8 @@ def test_any_line_of_plausible_tokens_is_read_or_refused(tokens):
         ("5,5 kick", "a.txt:1", "'5,5' is not a time"),
         ("5,5 kick", "a.txt:1", "write seconds with a point: 5.5"),
         ("00:05 kick", "a.txt:1", "write seconds with a point: 5"),
+        ("-5,5 kick", "a.txt:1", "write seconds with a point: -5.5"),
+        ("unit frames\n1:05 kick", "a.txt:2", "write the number of frames"),
         ("0 1:02,5 walking", "a.txt:1", "write seconds with a point: 62.5"),
         ("0 1:01:00 walking", "a.txt:1", "write seconds with a point: 3660"),
         ("5 3 walking", "a.txt:1", "not after the start"),

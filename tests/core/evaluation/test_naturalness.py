@@ -134,6 +134,8 @@ def test_body_language_counts_slow_frames_that_nobody_asked_for():
     asked = figures(body, postures=postures, asked=[frames < 100])
     assert asked["unusual_posture_share"] == 0.25 and asked["slow_frames"] == 100
     assert figures(body, postures=postures, asked=[frames % 4 == 0])["unusual_posture_share"] == 0.0
+    unknown = figures(body, postures=NormalPostures({3: (np.zeros(1), np.eye(1), 1.0)}))
+    assert np.isnan(unknown["unusual_posture_share"]) and unknown["slow_frames"] == 0  # none to compare with
 
 
 def test_own_figures_rest_on_the_used_frames():

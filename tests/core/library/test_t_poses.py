@@ -1,5 +1,6 @@
 """T-poses at the start and the end of recordings are left out; level arms in the middle, or while moving, stay."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -99,6 +100,21 @@ def test_an_act_that_a_person_names_there_stays(walk):
         assert t_poses.frames == [frames]
 
 
+def test_an_act_at_one_end_keeps_that_end_only(walk):
+    motion = join(spread_arms(hold(walk, 0, 1.0)), walk, spread_arms(hold(walk, len(walk) - 1, 1.0)))
+    t_poses = TPoses()
+    t_poses.add_recording(Path("clip.bvh"), motion, lambda: [
+        ClipAnnotation(0, 29, None, ("standing", "calm")),
+        ClipAnnotation(len(motion) - 30, len(motion) - 1, None, ("celebration",))])
+    assert t_poses.frames == [(30, 0)]
+
+
+def test_a_short_clip_that_moves_is_no_t_pose(walk):
+    motion = spread_arms(walk.frames(0, 5))
+    moved = motion.root_positions + np.outer(np.arange(5) / FPS, (4.0, 0.0, 0.0))
+    assert find_t_poses(replace(motion, root_positions=moved)) == (0, 0)
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Walks with a T-pose before them, labelled throughout, one of them with a key moment, and a calibration."""
@@ -120,6 +136,7 @@ def library(folder):
 def test_a_library_tells_what_is_left_out(library):
     assert {"3 clips: T-pose at the start left out, 1.5 s (median)",
             "1 clip left out: nothing but a T-pose"} <= set(library.notes)
+    assert library.unlabelled_notes == ()  # a label would not help the calibration
     assert "T-pose left out: 1.5 s" in next(one for one in list_clips(library) if one.path == "walk1.bvh").details
 
 
