@@ -23,6 +23,7 @@ import numpy as np
 from scipy.ndimage import minimum_filter1d
 
 from ..annotation import CONTINUOUS, DISCRETE, LOCOMOTION, ClipAnnotation
+from ..annotation.gaits import TURNING
 from ..base.banded_least_squares import BandedLeastSquares
 from ..base.errors import InputError, format_count
 from ..base.time_series import find_runs
@@ -34,7 +35,7 @@ from ..motion.t_poses import find_t_poses
 from ..motion.track import smooth_zero_phase_hann
 from .clip import T_POSE_MARGIN
 
-_ACTS = (DISCRETE | CONTINUOUS) - {*LOCOMOTION, "turning"}  # labels that a T-pose may show
+_ACTS = (DISCRETE | CONTINUOUS) - {*LOCOMOTION, TURNING}  # labels that a T-pose may show
 
 # a rotation that jumps by more than this (radians) and by so many times what its neighbours move, and returns
 _POP = np.radians(12.0)
