@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from .fixes import Fix
@@ -221,6 +222,17 @@ def format_count(count: int, noun: str, plural: str = "") -> str:
         The text.
     """
     return f"{count} {noun if count == 1 else plural or noun + 's'}"
+
+
+def format_some(names: Sequence[str], most: int = 6) -> str:
+    """Format the first names of a list, and how many more there are.
+
+    Args:
+        names: the names.
+        most: how many are written out.
+    """
+    listed = ", ".join(name or "(no name)" for name in names[:most])
+    return listed + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 def line_spans(line: str) -> tuple[tuple[float, float], ...]:

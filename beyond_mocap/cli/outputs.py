@@ -209,11 +209,12 @@ def _identify_library_files(library: Path, labels: Path | None) -> set[tuple[int
     beside = [os.path.splitext(path)[0] + ending for path in found for ending in (".txt", ".ball.csv")]
     files = [*map(str, found), *beside, *map(str, list_table_places(library, found))]
     folders = {folder: os.path.realpath(folder) for folder in set(map(os.path.dirname, files))}
+    there = set(filter(os.path.exists, files))
     missing = {os.path.normcase(os.path.join(folders[os.path.dirname(path)], os.path.basename(path)))
-               for path in files if not os.path.exists(path)}
+               for path in files if path not in there}
     if labels is not None and labels.name == TABLE_NAME:
         missing.discard(os.path.normcase(labels.resolve()))
-    return {*map(identify_file, filter(os.path.exists, files)), *missing}
+    return {*map(identify_file, there), *missing}
 
 
 def add_take_files(verb) -> None:

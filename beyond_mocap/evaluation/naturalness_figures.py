@@ -113,8 +113,6 @@ def measure_naturalness(view: View, planned: np.ndarray | None, asked: np.ndarra
     course, count = view.course, len(view.course.heading)
     postures = NormalPostures({}) if view.library is None else view.library.normal_postures
     out = measure_course_figures([course], [np.ones(count, dtype=bool)], [_sample_course(view, asked)], postures)
-    if not postures.regions:
-        out["unusual_posture_share"] = None
     if view.are_clips_known:
         out.update(measure_piece_figures(course, view.transitions / view.fps))
     if planned is not None:
@@ -181,8 +179,6 @@ def _add_source_figures(out: dict, view: View, asked: np.ndarray, postures: Norm
     known = np.isfinite(view.reference_rows)
     rows = reference.split_by_course(reference.flag_used(view.reference_rows[known & asked]))
     own = measure_course_figures(reference.courses, reference.split_by_course(used), rows, postures)
-    if not postures.regions:
-        own["unusual_posture_share"] = None
     frames = int(used.sum())
     hard = [(first, end) for first, end in find_runs(reference.jerk_ratio > JOLT_RATIO) if used[(first + end) // 2]]
     own["jolts_per_min"] = 60.0 * view.fps * len(hard) / frames if frames else math.nan

@@ -19,7 +19,7 @@ import numpy as np
 from ..annotation import LOCOMOTION, ClipAnnotation, estimate_gait_thresholds
 from ..annotation.gaits import STANDING, STANDING_SPEED
 from ..annotation.vocabulary import DIRECTIONS
-from ..base.errors import InputError, format_count
+from ..base.errors import InputError, format_count, format_some
 from ..motion.retargeting.neutral import NeutralStance, build_neutral_stance
 from ..motion.skeleton import Skeleton
 from . import cache
@@ -329,10 +329,9 @@ class Library:
         paths = [clip.path for clip in own if not (clip.annotations or clip.is_t_pose)]
         if not paths or any(clip.has_proposed_labels for clip in own):
             return ()
-        more = f" and {len(paths) - _NAMED_CLIPS} more" if len(paths) > _NAMED_CLIPS else ""
         verbs = ("has", "is") if len(paths) == 1 else ("have", "are")
         what = f"{format_count(len(paths), 'clip')} {verbs[0]} no labels and {verbs[1]} not used: "
-        what += ", ".join(paths[:_NAMED_CLIPS]) + more
+        what += format_some(paths, _NAMED_CLIPS)
         return (f"{what}; label what they show, since labels are proposed only where no clip has any",)
 
     @property

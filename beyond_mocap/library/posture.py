@@ -164,10 +164,10 @@ class NormalPostures:
             deviations, and its mean offset (k,) from the region's middle; empty where no region holds for any of them.
         """
         kinds = np.digitize((np.mean(speed), *speed), SPEED_EDGES)  # where the mean has no reference, a part may have
-        found = [one for k in kinds if (one := self._find_reference(int(k))) is not None]
-        if not found:
+        reference = next((one for k in kinds if (one := self._find_reference(int(k))) is not None), None)
+        if reference is None:
             return {}
-        middle, inverse, _ = self.regions[found[0]]
+        middle, inverse, _ = self.regions[reference]
         away, covariance, found = posture - middle, np.linalg.inv(inverse), {}
         for part, columns in PARTS.items():
             own = away[:, columns]

@@ -12,12 +12,12 @@ from itertools import combinations
 
 import numpy as np
 
-from ..base.errors import InputError, TimedMessage
+from ..base.errors import InputError, TimedMessage, format_some
 from ..base.time_series import find_runs
 from .files.unit_and_axes import measure_handedness
 from .model.marker_set import UNLABELED
 from .model.model import MarkerModel
-from .trial import MarkerTrial, format_some
+from .trial import MarkerTrial
 
 _MIRRORED_BELOW = -0.5  # handedness below which a body is mirrored (-1: surely, +1: surely not)
 # metres by which a distance may differ, in addition to half of its range in the trial itself

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import __version__
-from ..base.errors import InputError, UserCancelledError
+from ..base.errors import InputError, UserCancelledError, format_some
 from ..base.settings import collect_defaults, find_setting
 from ..motion.motion import Motion
 from ..synthesis.one_thread import limit_to_one_thread
@@ -24,7 +24,7 @@ from .model.model import MarkerModel
 from .pose.pose import HeldBall, PoseSettings, PoseSolution, solve_poses
 from .pose.residuals import measure_floor, measure_marker_visibility
 from .reconstruction_figures import collect_figures, describe_foot_slide
-from .trial import MarkerTrial, format_some
+from .trial import MarkerTrial
 from .trial_preparation import (
     check_model_fits,
     check_prepared_trial,

@@ -8,7 +8,7 @@ together can.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -176,17 +176,6 @@ class MarkerTrial:
         """
         keeps_residuals = self.residuals is not None and np.shape(positions)[:2] == self.residuals.shape
         return replace(self, positions=positions, residuals=self.residuals if keeps_residuals else None)
-
-
-def format_some(names: Sequence[str], most: int = 6) -> str:
-    """Format the first names of a list, and how many more there are.
-
-    Args:
-        names: the names.
-        most: how many are written out.
-    """
-    listed = ", ".join(name or "(no name)" for name in names[:most])
-    return listed + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 def find_duplicates(labels: Iterable[str]) -> list[str]:

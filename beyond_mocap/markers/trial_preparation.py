@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from ..base.errors import InputError
+from ..base.errors import InputError, format_some
 from .checks import check_trial, report_unused
 from .cleaning.clean import CleaningResult, clean_trial
 from .files.marker_set_text import read_shipped_sets
 from .model.marker_set import choose_marker_set, convert_labels
 from .model.model import MarkerModel
-from .trial import MarkerTrial, format_some, resample_evenly
+from .trial import MarkerTrial, resample_evenly
 
 MIN_MARKER_SHARE = 0.5
 """Share of a model's markers that a trial must contain."""

@@ -53,7 +53,10 @@ MIN_EASE_DISTANCE, MIN_RESERVE = 0.003, 0.002
 TRIM_SECONDS = 0.1
 """Seconds by which a foot may land later, or leave earlier, than recorded."""
 
-_RELAX_ROUNDS, _SLIDE_TOLERANCE = 3, 0.004  # rounds of relaxing the contact weights; metres of sliding that need none
+SLIDE_TOLERANCE = 0.004
+"""Metres that a leg may be too short for its foot without its stance being relaxed."""
+
+_RELAX_ROUNDS = 3  # rounds of relaxing the contact weights
 _SPREAD_FRAMES = 3  # frames at 30 per second over which a rise or drop is spread
 
 
@@ -170,7 +173,7 @@ def plant_feet(
         drop = compute_pelvis_drop(feet, [goal for goal, _ in goals], spread, max_drop)
         short = [measure_shortfall(replace(foot, weight=weight), goal, drop)
                  for foot, weight, (goal, _) in zip(feet, weights, goals)]
-        if attempt == _RELAX_ROUNDS or max(s.max(initial=0.0) for s in short) <= _SLIDE_TOLERANCE:
+        if attempt == _RELAX_ROUNDS or max(s.max(initial=0.0) for s in short) <= SLIDE_TOLERANCE:
             break
         relaxed = [relax_stances(weight, foot.contact_weight > 0.0, s, fps)
                    for weight, foot, s in zip(weights, feet, short)]
@@ -305,7 +308,7 @@ def relax_stances(weight: np.ndarray, planted: np.ndarray, short: np.ndarray, fp
         fps: frames per second.
     """
     trimmed = _trim_stances(weight, planted, short, fps)
-    return relax_contact_weights(trimmed, np.where(short > _SLIDE_TOLERANCE, short, 0.0))
+    return relax_contact_weights(trimmed, np.where(short > SLIDE_TOLERANCE, short, 0.0))
 
 
 def _trim_stances(weight: np.ndarray, planted: np.ndarray, short: np.ndarray, fps: float) -> np.ndarray:
@@ -317,8 +320,8 @@ def _trim_stances(weight: np.ndarray, planted: np.ndarray, short: np.ndarray, fp
     weight = weight.copy()
     for first, end in find_runs(planted):
         most = min(int(round(TRIM_SECONDS * fps)), (end - first) // 4)
-        late = np.flatnonzero(short[first : first + most] > _SLIDE_TOLERANCE)
-        early = np.flatnonzero(short[end - most : end] > _SLIDE_TOLERANCE)
+        late = np.flatnonzero(short[first : first + most] > SLIDE_TOLERANCE)
+        early = np.flatnonzero(short[end - most : end] > SLIDE_TOLERANCE)
         if len(late):
             weight[first : first + late[-1] + 1] = 0.0
         if len(early):

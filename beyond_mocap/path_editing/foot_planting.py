@@ -45,7 +45,7 @@ LEAST_BEND = 0.05
 _FIRM = 4.0  # sharpness of the limit: where the goal is at full length, a sixth of SPARE is left
 _PELVIS_SECONDS, _STRIDE = 0.5, 0.5  # seconds; metres between the feet on stairs, in the mean
 _UP = np.array([0.0, 0.0, 1.0])
-_ROUNDS, _SLIDES_FROM = 2, 0.004  # rounds of holding stances less firmly; m of sliding that need none
+_ROUNDS = 2  # of holding stances less firmly
 _FLOOR, _EVEN = 200.0, 0.003  # smoothness of a recorded floor: half of a half-second wave passes; metres
 # metres off its goal beyond which a foot in contact is held more firmly; rounds of that
 _GOAL_TOLERANCE, _FIRMER_ROUNDS = 0.004, 8
@@ -120,7 +120,7 @@ def plant_feet_on_ground(skeleton: Skeleton, root: np.ndarray, rotations: np.nda
         drop = foot_plant.compute_pelvis_drop(placed_feet, [goal for goal, _ in goals], spread, most - FIRST_DROP)
         lacking = [foot_plant.measure_shortfall(replace(foot, weight=weight), goal, drop)
                    for foot, weight, (goal, _) in zip(placed_feet, firm, goals)]
-        if round_number == _ROUNDS or max(s.max(initial=0.0) for s in lacking) <= _SLIDES_FROM:
+        if round_number == _ROUNDS or max(s.max(initial=0.0) for s in lacking) <= foot_plant.SLIDE_TOLERANCE:
             break
         firm = [foot_plant.relax_stances(weight, foot.contact_weight > 0.0, s, fps)
                 for weight, foot, s in zip(firm, feet, lacking)]

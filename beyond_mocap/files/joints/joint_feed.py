@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...base.errors import InputError, format_count
+from ...base.errors import InputError, format_count, format_some
 from .landmarks import LANDMARKS
 
 _FAR = 1e9  # farther than any stadium in any unit: damaged numbers stay outliers, and their squares are finite
@@ -146,8 +146,7 @@ class JointCollector:
         return np.clip(rows[first], -_FAR, _FAR)
 
     def _list_unknown(self) -> str:
-        names = sorted(self.unknown)
-        return ", ".join(names[:_MOST_NAMES]) + f" and {len(names) - _MOST_NAMES} more" * (len(names) > _MOST_NAMES)
+        return format_some(sorted(self.unknown), _MOST_NAMES)
 
     def _build_person(self, person: str, points: array) -> PlayerJoints:
         rows = np.frombuffer(points).reshape(-1, 5) if points else np.zeros((0, 5))

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...base.errors import InputError, TimedMessage, UserCancelledError
+from ...base.errors import InputError, TimedMessage, UserCancelledError, format_some
 from ...base.time_series import find_runs
 from ..trial import MarkerTrial
 from .carriers import find_carriers, measure_softness
@@ -118,7 +118,7 @@ def _describe_by_label(stretches, what):
         own = by_label[labels[0]]
         count = sum(one.frames for one in own)
         noun = what if count != 1 else what.replace("frames", "frame")
-        times = ", ".join(one.format_time() for one in own[:3]) + (f" and {len(own) - 3} more" if len(own) > 3 else "")
+        times = format_some([one.format_time() for one in own], 3)
         yield _build_line(f"{_format_labels(labels)}: {count} {noun}: {times}", own)
 
 

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...base.errors import InputError, format_count
-from ..trial import MarkerEvent, MarkerTrial, format_some
+from ...base.errors import InputError, format_count, format_some
+from ..trial import MarkerEvent, MarkerTrial
 from .unit_and_axes import check_given_unit, decide_unit, detect_up_axis, measure_handedness, measure_height
 
 _MAX_COORDINATE = 1e9  # in any unit; a larger coordinate is damage

@@ -13,8 +13,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ...base.errors import InputError
-from ..trial import MarkerTrial, format_some
+from ...base.errors import InputError, format_some
+from ..trial import MarkerTrial
 from .template import JOINTS, LANDMARKS
 
 UNLABELED = re.compile(r"^(\*\d+|[UuxX]_?\d+|C_\d+|[Uu]nlabell?ed.*|[Uu]nnamed.*)$")

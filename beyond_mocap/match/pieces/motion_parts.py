@@ -86,7 +86,8 @@ class MotionSpan:
     parts: tuple[tuple[Content, int, int], ...]
 
     def load_take(self, skeleton: Skeleton) -> Take:
-        """Load what `player_motion.construct_player` constructs for the span; InputError if a file is damaged.
+        """Load what `player_motion.construct_player` constructs for the span; InputError or ValueError if a file is
+        damaged.
         """
         size = measure_size(self.plan, skeleton)
         own = skeleton if size == 1.0 else skeleton.scale(size)

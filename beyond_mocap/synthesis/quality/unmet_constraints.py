@@ -204,11 +204,13 @@ def _report_synthetic(played: Playback, library: Library | None) -> list[TimedMe
               (run_ups, "run-up of a synthetic kick: no recorded motion fits as well")]
     kinds += [(there, f"synthetic {name}: no recorded one fits") for name, there in _list_shown_actions(played)]
     fps = played.motion.fps
-    speed = movement.measure_travel_speed(played.pelvis, fps)
     for prefix, kind, instead in _SYNTHETIC_INSTEAD:
         there = _frames_of_clips(played, SYNTHETIC_FOLDER + prefix) if prefix else others
-        kinds += (explain_shown_speeds(library, there, speed, fps, instead)
-                  if kind == "speeds" and library is not None else [(there, describe(kind, instead))])
+        if kind == "speeds" and library is not None and there.any():
+            speed = movement.measure_travel_speed(played.pelvis, fps)
+            kinds += explain_shown_speeds(library, there, speed, fps, instead)
+        else:
+            kinds.append((there, describe(kind, instead)))
     return [_build_line(played.times, there, what, f" ({np.sum(there) / fps:.1f} s in all)")
             for there, what in kinds]
 

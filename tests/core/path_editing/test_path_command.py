@@ -117,7 +117,7 @@ def test_the_report_has_one_height_of_feet_over_the_ground_below_them(run, tmp_p
         assert not any(name.startswith("ground_mm") for name in report["unknown"])
 
 
-def test_toes_above_the_ground_are_told_with_the_way_down(run, place, tmp_path):
+def test_toes_above_the_ground_are_reported_with_the_way_down(run, place, tmp_path):
     walk = bvh.read_bvh(place / "walk.bvh", 0.01).motion
     bvh.write_bvh(place / "raised.bvh", replace(walk, root_positions=walk.root_positions + [0.0, 0.0, 0.025]))
     (line,) = (line for line in run(recording="raised")[2] if "toes" in line)
@@ -131,7 +131,7 @@ def test_toes_above_the_ground_are_told_with_the_way_down(run, place, tmp_path):
     assert abs(measure_floor_height(bvh.read_bvh(tmp_path / "out.bvh", 0.01).motion)) < 0.003
 
 
-def test_a_hairpin_is_told_and_a_turn_of_the_recording_is_not(run, place, tmp_path):
+def test_a_hairpin_is_reported_and_a_turn_of_the_recording_is_not(run, place, tmp_path):
     (place / "hairpin.csv").write_text("x_m,y_m\n0,0\n2,0\n0,0.1\n")
     assert run("--report", tmp_path / "r.json", curve="hairpin")[0] == 0
     report = json.loads((tmp_path / "r.json").read_text())
