@@ -168,6 +168,9 @@ def test_a_motion_is_added_to_a_library_with_its_words(run, place, tmp_path, mad
     assert (clips / "walk.txt").read_text().split() == ["0f", f"{len(made.motion) - 1}f", "walking"]
     status, _, error = run(place / "walk.trc", "--out", tmp_path / "o.bvh", *words)
     assert status == 2 and "already" in error[0]
+    status, _, error = run(place / "walk.trc", "--out", tmp_path / "o.bvh", "--report", clips / "walk.txt", "--add-to",
+                           clips)
+    assert status == 2 and "walk.txt: is a file of the library" in error[0]
     (clips / "walk.bvh").unlink()
     status, _, error = run(place / "walk.trc", "--static", place / "static.trc", "--out", tmp_path / "p.bvh", *words)
     assert status == 2 and "already has labels" in error[0] and not (tmp_path / "p.bvh").exists()
