@@ -27,7 +27,7 @@ TRAVEL_COST = 6.0  # per radian beyond TRAVEL_LIMITS
 FORWARD_COST = 0.3  # per radian to travel and m/s above 0.6: forward is cheaper
 ALONE_COST = 1.0  # the same up to 1.6 m/s with no ball to watch, or only one at the feet: people turn, not back away
 SIDEWAYS_COST, SIDEWAYS_WIDTH = 2.5, np.radians(45.0)  # at a right angle to travel, and the width of that bell
-TURN_COST, TURN_RATE_COST, TURN_ANGLE_COST = 0.12, 0.08, 0.7  # per second of turning, per (pi / s)^2, per radian
+TURN_COST, TURN_RATE_COST, TURN_ANGLE_COST = 0.12, 0.6, 0.7  # per second of turning, per (pi / s)^2, per radian
 GIVEN_COST = 40.0  # per radian and second: given headings hold against all others
 DIRECTION_COST = 12.0  # per radian beyond the dead zone from the heading that a label asks for: above TRAVEL_COST
 OTHER_WAY_COST = 8.0  # per radian that is turned against a label: the long way round is cheaper
@@ -40,10 +40,12 @@ ASKED_SECONDS = 3.0
 _TRAVEL_SPEEDS = np.array([1.6, 2.2, 3.0, 4.5])  # m/s, with the largest angle between heading and travel at each
 _KEEPER_SPEEDS = np.array([3.0, 3.6, 4.4, 5.5])
 _TRAVEL_LIMITS = np.radians([180.0, 60.0, 35.0, 25.0])
-_STANDING_TURN, _RUNNING_TURN, _RUNNING_SPEED = 3, 4, 2.2  # bins per decision (180 and 240 degrees/s); m/s
-_CALM_TURN = 2  # the same towards what is asked (120 degrees/s): a body that is held to a faster turn snaps
+_RUNNING_SPEED = 2.2  # m/s
+_TURNS = 2, 3  # bins per decision below and above it (120 and 180 degrees/s): with the pelvis' own sway, faster ones snap
+_SEEN_TURNS = 3, 4  # the same where headings were measured (180 and 240): such turns were real
+_CALM_TURN = 2  # the same towards what is asked (120), at any speed
 _APPROACH = 1.5  # s in which a body turns by 180 degrees that calmly, before and after
-_STEPS = np.arange(-_RUNNING_TURN, _RUNNING_TURN + 1)  # bins from one decision to the next
+_STEPS = np.arange(-_SEEN_TURNS[1], _SEEN_TURNS[1] + 1)  # bins from one decision to the next
 _NEAR_BALL = 2.0  # m; a nearer ball has no bearing, the last one holds
 _FAR_BALL = (25.0, 30.0)  # m between which the way of the ball takes its place
 _BALL_LEAD = 1.0  # s that the way of a far ball is ahead of it
@@ -87,11 +89,13 @@ def weigh_headings(track: SampledTrack, request: HeadingRequest) -> WeighedHeadi
     if at[-1] != count - 1:
         at = np.append(at, count - 1)
     bearings = _compute_bearings(track, request.play, at)
-    plain, plain_steps = _compute_heading_costs(bearings, request.is_keeper), _compute_step_costs(bearings)
+    plain, plain_steps = _compute_heading_costs(bearings, request.is_keeper), _compute_step_costs(bearings, _TURNS)
     costs, steps, is_asked = plain, plain_steps, _find_asked(bearings, request)
     if is_asked.any():
         asked_costs = _compute_asked_costs(bearings, request)
         costs = costs + asked_costs + _measure_key_costs(bearings, request.measured_keys) * bearings.seconds[:, None]
+        is_seen = _find_near(bearings, [(key.time, key.end) for key in request.measured_keys])
+        steps = np.where(is_seen[:, None], _compute_step_costs(bearings, _SEEN_TURNS), plain_steps)
         steps = _limit_turns(bearings, request, steps, asked_costs)
     return WeighedHeadings(times=bearings.times, plain=plain, plain_steps=plain_steps, costs=costs, steps=steps,
                             is_asked=is_asked)
@@ -182,7 +186,12 @@ def _find_asked(bearings: _Bearings, request: HeadingRequest) -> np.ndarray:
     """Find the decisions (D,) bool that what is asked changes; all others stay as they are without it."""
     spans = [span for span in request.spans if _find_quarter(span) is not None or _find_turning_side(span) is not None]
     held = [(pin.time, pin.end) for pin in (*request.keys, *request.measured_keys, *request.gazes)]
-    starts, ends = np.array([*held, *((span.start, span.end) for span in spans)]).reshape(-1, 2).T
+    return _find_near(bearings, [*held, *((span.start, span.end) for span in spans)])
+
+
+def _find_near(bearings: _Bearings, periods: Sequence[tuple[float, float]]) -> np.ndarray:
+    """Find the decisions (D,) bool within ASKED_SECONDS of periods (start, end) s."""
+    starts, ends = np.array(periods).reshape(-1, 2).T
     begun = np.searchsorted(np.sort(starts - ASKED_SECONDS), bearings.times, side="right")
     return begun > np.searchsorted(np.sort(ends + ASKED_SECONDS), bearings.times, side="left")
 
@@ -249,12 +258,12 @@ def _find_inside(bearings: _Bearings, span: Span) -> np.ndarray:
     return (bearings.times >= span.start) & (bearings.times <= span.end)
 
 
-def _compute_step_costs(bearings: _Bearings) -> np.ndarray:
-    """Compute the cost (D, 2 N + 1) of coming to a decision by -N .. N bins; inf where legs cannot turn so fast."""
+def _compute_step_costs(bearings: _Bearings, turns: tuple[int, int]) -> np.ndarray:
+    """Compute the cost (D, 2 N + 1) of coming to a decision by -N .. N bins; inf beyond `turns`, slow and fast."""
     duration, angle = np.roll(bearings.seconds, 1)[:, None], BIN_ANGLE * np.abs(_STEPS)
     rate = angle / np.maximum(duration, 1e-9) / np.pi
     cost = (TURN_COST + TURN_RATE_COST * rate**2) * duration * (_STEPS != 0) + TURN_ANGLE_COST * angle
-    limit = np.where(bearings.speed > _RUNNING_SPEED, _RUNNING_TURN, _STANDING_TURN)[:, None]
+    limit = np.where(bearings.speed > _RUNNING_SPEED, turns[1], turns[0])[:, None]
     return np.where(np.abs(_STEPS) <= limit, cost, np.inf)
 
 
