@@ -6,6 +6,7 @@ import pytest
 from beyond_mocap.synthesis.search.blocks import FINEST_LENGTH, BlockCandidates, BlockSearch
 from beyond_mocap.synthesis.search.distance import build_warped_edit
 from beyond_mocap.synthesis.search.locomotion import (
+    _read_chain,
     compute_block_distances,
     compute_travelled_distance,
     match_distance,
@@ -78,6 +79,14 @@ def test_distance_is_removed_as_well_as_added(library, order, track_of):
     sections = match_distance(search, blocks, 0.5)
     assert before > 35.0
     assert total(library, asked, sections) == pytest.approx(1.4 * 8, abs=0.6)
+
+
+@pytest.mark.parametrize("slots, blocks", [(10, 8), (20, 18), (40, 18)])
+def test_chains_played_at_recorded_speed_go_before_cheaper_ones(slots, blocks):
+    errors, costs = np.full((18, 1), 5.0), np.full((18, 1), 1.0)
+    errors[[7, 17]], costs[[7, 17], 0] = 0.05, (0.2, 0.1)
+    layers, back = list(zip(errors, costs)), [np.zeros(1, int)] * 17
+    assert len(_read_chain(layers, back, slots)) == blocks
 
 
 def test_entry_and_exit_stay(library, order, track_of):
