@@ -75,7 +75,7 @@ def report_library_speed() -> str:
     Built from the Bandai clips, cut or repeated to 120 frames: 75 files and their 75 mirror images.
     """
     sources = sorted((DATA / "mocap" / "bandai").glob("*.bvh"))
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as caches:
         rows = ["file,start_frame,end_frame,key_frame,labels"]
         for number in range(75):
             head, _, motion = sources[number % len(sources)].read_text().partition("MOTION")
@@ -85,12 +85,19 @@ def report_library_speed() -> str:
             Path(folder, name).write_text("\n".join([head + "MOTION", "Frames: 120", lines[1], *frames]) + "\n")
             rows.append(f"{name},0,119,,{'walking' if number % 2 else 'running'} front")
         Path(folder, "annotations.csv").write_text("\n".join(rows) + "\n")
-        cold, _ = measure_seconds(lambda: build_library(folder, rebuild=True))
-        warm, _ = measure_seconds(lambda: build_library(folder))
+        cold, _ = measure_seconds(lambda: _build_clusters(folder, tempfile.mkdtemp(dir=caches)))
+        cache = tempfile.mkdtemp(dir=caches)
+        _build_clusters(folder, cache)
+        warm, _ = measure_seconds(lambda: _build_clusters(folder, cache))
     return (
         f"75 clips of 120 frames and their mirror images: {cold:.2f} s from text to clusters (target 5), {warm:.2f} s "
         "cached (target 0.3); Faustino 187 s and 12.9 s"
     )
+
+
+def _build_clusters(folder: str, cache: str) -> None:
+    """Build a library with its clusters, which are computed when they are first needed."""
+    build_library(folder, cache_dir=cache).clusters  # noqa: B018
 
 
 def report_peak_memory(name: str, folder: Path, cache: Path, number: int = 2) -> str:

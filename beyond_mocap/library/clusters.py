@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import io
 import warnings
+from collections.abc import Mapping
 from contextlib import redirect_stderr
 from dataclasses import dataclass
 
@@ -23,6 +24,7 @@ BLOCK_LENGTHS = (32, 16, 8)
 CLUSTERS = 100
 SAMPLES_PER_BLOCK = 8
 MAX_FITTED = 20000  # blocks that k-means is fitted to; the others are only assigned
+_ARRAYS = ("start", "label", "medoid")
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +43,15 @@ class Clusters:
     start: np.ndarray
     label: np.ndarray
     medoid: np.ndarray
+
+    def to_arrays(self) -> dict[str, np.ndarray]:
+        """Return the arrays by name, which `from_arrays` takes."""
+        return {f"{name}_{self.length}": getattr(self, name) for name in _ARRAYS}
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, np.ndarray], length: int) -> Clusters:
+        """Build the clusters of one length from what `to_arrays` returned."""
+        return cls(length, *(arrays[f"{name}_{length}"] for name in _ARRAYS))
 
     def label_at(self, frame: int) -> int:
         """Return the cluster of the block that starts at `frame`, or -1 where none starts."""

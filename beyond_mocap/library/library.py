@@ -93,8 +93,14 @@ class Library:
 
     @cached_property
     def clusters(self) -> dict[int, Clusters]:
-        """Clusters of blocks by block length, which only the block search needs."""
-        return {length: cluster_blocks(self.frames, length, self.seed) for length in BLOCK_LENGTHS}
+        """Clusters of blocks by block length, which only the block search needs; cached, since they take seconds."""
+        index = self.index_place[-1] if self.index_place else ""
+        stored = self._find_stored(f"clusters-{index}-{self.seed}", self._cluster_blocks)
+        return {length: Clusters.from_arrays(stored, length) for length in BLOCK_LENGTHS}
+
+    def _cluster_blocks(self) -> dict[str, np.ndarray]:
+        found = (cluster_blocks(self.frames, length, self.seed) for length in BLOCK_LENGTHS)
+        return {name: array for one in found for name, array in one.to_arrays().items()}
 
     @cached_property
     def cut_receptions(self) -> tuple[Key, ...]:
@@ -171,7 +177,7 @@ class Library:
         return {name: np.asarray(getattr(stance, name)) for name in _STANCE_NUMBERS}
 
     def _find_stored(self, name: str, compute: Callable[[], dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
-        """Find arrays that are computed from the recordings in the cache, or compute and store them."""
+        """Find arrays that are computed from the library's frames in the cache, or compute and store them."""
         place = self.index_place and (*self.index_place[:2], name)
         stored = cache.load_arrays(*place) if place else None
         if stored is None:

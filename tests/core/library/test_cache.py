@@ -79,15 +79,21 @@ def test_from_the_cache_come_the_same_bits(clips_folder, library):
     assert_same(library, again)
 
 
-def test_the_stance_and_postures_of_all_recordings_are_measured_once(clips_folder, library, monkeypatch):
+def test_stance_postures_and_clusters_are_computed_once(clips_folder, library, monkeypatch):
     stance, postures = library.neutral_stance, library.normal_postures.to_arrays()
+    completed = library.with_synthetic_clips
+    clusters = [one.clusters[8].to_arrays() for one in (library, completed)]
     monkeypatch.setattr(synthetic_clips, "sample_upright_example", None)
     monkeypatch.setattr(library_module, "fit_normal_postures", None)
+    monkeypatch.setattr(library_module, "cluster_blocks", None)
     again = build_library(clips_folder)
     assert all(np.array_equal(getattr(stance, name), getattr(again.neutral_stance, name))
                for name in library_module._STANCE_NUMBERS)
     assert len(postures["kinds"]) and np.array_equal(library.strangeness, again.strangeness)
     assert all(np.array_equal(values, again.normal_postures.to_arrays()[name]) for name, values in postures.items())
+    for arrays, one in zip(clusters, (again, again.with_synthetic_clips)):
+        assert all(np.array_equal(values, one.clusters[8].to_arrays()[name]) for name, values in arrays.items())
+    assert len(clusters[0]["start_8"]) < len(clusters[1]["start_8"])
 
 
 def test_built_twice_gives_the_same_bits(clips_folder, library, tmp_path):
