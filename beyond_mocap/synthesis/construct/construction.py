@@ -372,7 +372,7 @@ def solve_heading(
     Returns:
         (T,) rad, unwrapped.
     """
-    firm = compute_turning_firmness(source.heel_toe_contacts, source.height, track.fps)
+    firm = compute_turning_firmness(source.heel_toe_contacts, source.height, source.transitions, track.fps)
     held = 0.0 if track.held is None else track.held * (1.0 - freedom)
     if track.heading is not None:
         firm = firm * measure_rest(source, track.speed)

@@ -34,6 +34,10 @@ _ROUNDS = 3  # of holding what is beyond
 # Weights of the recording's own move and turn against a metre of a foot in contact: they decide what feet leave open.
 _OWN_MOVE, _OWN_TURN = 1e-3, 1e-4
 
+_SWIVEL = np.radians(45.0)
+"""Rad/s by which feet in contact may turn a body beyond its recording. More comes from a cut between two stances: a
+person gets from one to the other with a step and does not swivel on both feet."""
+
 
 def measure_foot_moves(skeleton: Skeleton, source: SourceMotion, fps: float) -> tuple[np.ndarray, np.ndarray]:
     """Measure how a body has to move from frame to frame so that its feet in contact stay.
@@ -65,8 +69,10 @@ def measure_foot_moves(skeleton: Skeleton, source: SourceMotion, fps: float) -> 
     matrix[:, :2, 2] = matrix[:, 2, :2] = np.einsum("tp,tpc->tc", weight, arm)
     right[:, :2] = np.einsum("tp,tpc->tc", weight, miss) + _OWN_MOVE * own_move
     right[:, 2] = np.einsum("tp,tpc,tpc->t", weight, arm, miss) + _OWN_TURN * own_turn
-    found = np.linalg.solve(matrix, right[..., None])[..., 0]
-    return found[:, :2], found[:, 2]
+    turn = np.linalg.solve(matrix, right[..., None])[:, 2, 0]
+    turn = own_turn + np.clip(turn - own_turn, -_SWIVEL / fps, _SWIVEL / fps)
+    # the first two rows of the system give the best move with that turn
+    return (right[:, :2] - matrix[:, :2, 2] * turn[:, None]) / matrix[:, :1, 0], turn
 
 
 def measure_rest(source: SourceMotion, speed: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...base.banded_least_squares import BandedLeastSquares
+from ...base.easing import smoothstep
 from ...base.time_series import find_runs
 from ...base.vectors import arctan2, measure_lengths
 from ...motion import quaternion
@@ -23,6 +24,10 @@ from ...motion.track import smooth_zero_phase_hann
 TURN_WEIGHT = 12.0  # weight of the recording's own turning per frame, against the direction of travel
 AIRBORNE_FIRMNESS = 40.0  # factor on it where the body flies, lies or kneels and so cannot turn at will
 _FLIGHT_SECONDS = 0.3  # s without a foot on the ground that count as flight; the flights of running are shorter
+CUT_FIRMNESS, CUT_REACH = 15.0, (0.15, 0.65)
+"""Factor on it near a cut, and seconds from the cut up to which it holds, and from which on it is 1: the angle between
+travel and heading jumps there from one recording to the next, and a body that followed the jump would swivel."""
+
 _LOW = 0.6  # share of the usual height of the hips below which a body lies or kneels
 IN_PLACE_SPEED = 0.3  # m/s below which a direction of travel says nothing about the heading
 
@@ -151,12 +156,16 @@ def follow_turning(
     return squares.solve()[:, 0]
 
 
-def compute_turning_firmness(heel_toe_contacts: np.ndarray, height: np.ndarray, fps: float) -> np.ndarray:
+def compute_turning_firmness(heel_toe_contacts: np.ndarray, height: np.ndarray, transitions: np.ndarray,
+                             fps: float) -> np.ndarray:
     """Compute how firmly the recording's turning is followed: AIRBORNE_FIRMNESS in flight or with low hips, else 1.
+
+    Near a cut it is CUT_FIRMNESS times that.
 
     Args:
         heel_toe_contacts: (T, 2, 2) bool, heel and toe contacts.
         height: (T,) m of the root.
+        transitions: (C,) frames at which the clip changes, ascending.
         fps: frames per second.
     Returns:
         (T,) factor.
@@ -166,7 +175,10 @@ def compute_turning_firmness(heel_toe_contacts: np.ndarray, height: np.ndarray, 
     for first, last in find_runs(off):
         if last - first >= _FLIGHT_SECONDS * fps:
             out[first:last] = AIRBORNE_FIRMNESS
-    return out
+    frames, edges = np.arange(len(out)), np.concatenate([[-np.inf], transitions, [np.inf]])
+    after = np.searchsorted(transitions, frames, side="right")
+    away = np.minimum(frames - edges[after], edges[after + 1] - frames) / fps
+    return out * (1.0 + (CUT_FIRMNESS - 1.0) * (1.0 - smoothstep(away, *CUT_REACH)))
 
 
 def _motion_weight(speed: np.ndarray) -> np.ndarray:

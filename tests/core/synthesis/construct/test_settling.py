@@ -1,9 +1,12 @@
 """A slow body goes where its feet carry it, near its track; at speed it is on its track."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from beyond_mocap.library.library import Library
+from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.track import Track, sample_track
 from beyond_mocap.motion.track.resting_place import MOST_LEEWAY
 from beyond_mocap.synthesis.construct.settling import REST_FIRMNESS, measure_foot_moves, measure_rest, settle_on_track
@@ -33,6 +36,19 @@ def test_feet_carry_a_body_as_far_as_it_was_recorded(library, path, speed):
     moves, turn = measure_foot_moves(library.skeleton, source, FPS)
     assert np.linalg.norm(moves.sum(axis=0)) == pytest.approx(speed * 119 / FPS, rel=0.08, abs=0.03)
     assert abs(np.degrees(turn.sum())) < 8.0
+
+
+@pytest.mark.parametrize("frames, turned", [(50, 50.0), (5, 10.0)])
+def test_feet_turn_a_body_slowly_only(library, frames, turned):
+    """Both stand while the pose turns over them: in a second as a body does it, in some frames as a cut does."""
+    source, at = source_of(library, "stand.bvh", 60), np.arange(60)
+    angle = np.radians(50.0) * np.clip((at - 4) / frames, 0.0, 1.0)
+    pose = source.pose.copy()
+    pose[:, 0] = quaternion.multiply(quaternion.from_up_angle(angle), pose[:, 0])
+    _, turn = measure_foot_moves(library.skeleton, replace(source, pose=pose), FPS)
+    own = np.degrees(source.turn[1:].sum())
+    assert -np.degrees(turn.sum()) + own == pytest.approx(turned, abs=3.0)
+    assert np.abs(turn - source.turn[1:]).max() < np.radians(45.0) / FPS + 1e-9
 
 
 def test_a_standing_body_rests_beside_a_place_that_shifts(library):

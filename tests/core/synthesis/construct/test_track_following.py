@@ -6,11 +6,14 @@ import pytest
 from beyond_mocap.motion.track import smooth_zero_phase_hann
 from beyond_mocap.synthesis.construct.track_following import (
     AIRBORNE_FIRMNESS,
+    CUT_FIRMNESS,
     add_sway,
     compute_turning_firmness,
     fit_heading,
     pull_to_track,
 )
+
+NO_CUTS = np.zeros(0, int)
 
 
 def ahead(count, speed=2.0, angle=0.0):
@@ -103,14 +106,26 @@ def test_who_lies_does_not_turn_but_who_stands_up_afterwards_does():
     direction = np.where(np.arange(count) < 15, 0.0, 2.0)
     speed = np.where((np.arange(count) < 15) | (np.arange(count) > 105), 2.0, 0.0)
     velocity = np.tile([2.0, 0.0], (count, 1))
-    firm = compute_turning_firmness(standing, height, 30.0)
+    firm = compute_turning_firmness(standing, height, NO_CUTS, 30.0)
     assert (firm[lying] == AIRBORNE_FIRMNESS).all() and (firm[~lying] == 1.0).all()
     loose, kept = (fit_heading(direction, speed, velocity, np.zeros(count), firm=f) for f in (1.0, firm))
     assert np.ptp(loose[lying]) > 0.8 and np.ptp(kept[lying]) < 0.25
     assert kept[0] == pytest.approx(0.0, abs=0.3) and kept[-1] == pytest.approx(2.0, abs=0.3)
 
 
+def test_near_a_cut_a_body_turns_as_recorded():
+    count = 90
+    firm = compute_turning_firmness(np.ones((count, 2, 2), bool), np.full(count, 0.9), np.array([45]), 30.0)
+    assert firm[45] == CUT_FIRMNESS and firm[0] == firm[-1] == 1.0 and (np.diff(firm[45:]) <= 0.0).all()
+    # the angle between travel and heading jumps by 60 degrees at the cut
+    angle = np.where(np.arange(count) < 45, 0.0, np.radians(60.0))
+    velocity = 1.5 * np.column_stack([np.cos(angle), np.sin(angle)])
+    fastest = [np.abs(np.diff(fit_heading(np.zeros(count), np.full(count, 1.5), velocity, np.zeros(count),
+                                          firm=one))).max() for one in (1.0, firm)]
+    assert fastest[1] < 0.5 * fastest[0]
+
+
 def test_the_flights_of_running_and_a_single_step_stay_as_they_were():
     standing = np.ones((60, 2, 2), bool)
     standing[10:17] = standing[30:37] = False
-    assert (compute_turning_firmness(standing, np.full(60, 0.9), 30.0) == 1.0).all()
+    assert (compute_turning_firmness(standing, np.full(60, 0.9), NO_CUTS, 30.0) == 1.0).all()
