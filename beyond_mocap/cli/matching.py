@@ -102,10 +102,10 @@ def run_match(options, reporter: ProgressReporter, writers: Mapping[str, Writer]
         **{**option_values(MatchRequest, options, "match.section", "match.work", "match", "pitch", "library"),
            "players": tuple(dict.fromkeys(options.players)), "workers": options.workers or len(_list_cores())},
     )  # fmt: skip
-    if options.apart is None:
+    if options.run_isolated is None:
         result = synthesize_match(order, reporter.show_progress, reporter.is_cancelled)
     else:
-        options.apart(remove_option(options.argv, "--scene"), reporter.show_progress, reporter.is_cancelled)
+        options.run_isolated(remove_option(options.argv, "--scene"), reporter.show_progress, reporter.is_cancelled)
         result = read_result(order)
     reporter.finish(result.notes)
     for player in result.failed:
