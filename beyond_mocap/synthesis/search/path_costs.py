@@ -261,7 +261,7 @@ class PathCosts:
         """Compute the cost of pieces of key moments in a slot.
 
         Labels have no weight here except avoided ones. A kick that was recorded slower than the player runs is played
-        faster, within the limits of what may yield (../shared/metrics.md).
+        faster: the playback rate yields before feet slide (docs/explanation/quality.md).
 
         Args:
             first, end: output frames of the slot.
