@@ -171,8 +171,8 @@ TABLES = {
                 "match at which to begin", precision=1),
         Setting(name="section_end", default=0.0, least=0.0, unit="seconds", title="To", tooltip="Second of a whole "
                 "match at which to end; 0 for its end", precision=1),
-        Setting(name="live", default=False, tooltip="Update a player automatically after edits of the drawn track, "
-                "pins or strips: first quickly, then with the quality of Synthesize"),
+        Setting(name="live", default=False, title="Update Automatically", tooltip="Update a player after edits of the "
+                "drawn track, pins or strips: first quickly, then with the quality of Synthesize"),
         Setting(name="show_moment_names", default=True, title="Labels in Colour", tooltip="Show labels in the colours "
                 "of their actions, key moments, legend and keys over NLA editors and dope sheets"),
         Setting(name="make_bodies", default=True, title="Characters", tooltip="Create a low-poly character for each "

@@ -40,8 +40,8 @@ TABLES = {
         Setting(name="library", default=True, title="Run-Up from Library", tooltip="Find the motion before and after "
                 "the throw among the clips of the library (step 1); otherwise the throw is blended into the armature's "
                 "own motion"),
-        Setting(name="live", default=True, title="Live Update", tooltip="Update the preview when the target is moved "
-                "or these settings change, until it is applied"),
+        Setting(name="live", default=True, title="Update Automatically", tooltip="Update the preview when the "
+                "target is moved or these settings change, until it is applied"),
     ),
     "throw.train": (
         Setting(name="action", default="throw", choices=("throw", "kick"), option="--action",

@@ -252,7 +252,7 @@ class PathCosts:
         if self.request.manner_cost is not None:
             yield "manner", self.request.manner_cost[frame]
         if self.reuse_cost is not None:
-            yield "price", self.reuse_cost[frame]
+            yield "reused", self.reuse_cost[frame]
         if avoid:
             yield "avoided", AVOIDED_COST * self.index.shows_labels(avoid)[frame]
 
@@ -303,7 +303,7 @@ class PathCosts:
         if self.request.style_cost is not None:
             yield "style", self.request.style_cost[self.index.round_frame(start)]
         if self.reuse_cost is not None:
-            yield "price", self.reuse_cost[middle]
+            yield "reused", self.reuse_cost[middle]
         if self.request.avoided:
             yield "avoided", AVOIDED_COST * SLOT / length * self._shows_avoided(first, end, a, b)
 
