@@ -68,7 +68,7 @@ def add_match(verbs):
                       help="format of the events: {}; default: detected")
     verb.add_argument("--provider", metavar="NAME", default="", action=_ProviderOption,
                       help="format of FILE: {}; default: detected")
-    verb.add_argument("--library", type=parse_path, required=True, help="a folder with BVH files and annotations")
+    verb.add_argument("--library", type=parse_path, required=True, help="a folder with recordings and annotations")
     verb.add_argument("--out", type=parse_path, required=True, metavar="FOLDER",
                       help="output folder; an unfinished run continues there")
     add_options(verb, "match.section")

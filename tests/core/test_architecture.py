@@ -225,6 +225,13 @@ def test_links_in_the_docs_lead_somewhere():
     ] == []
 
 
+def test_the_first_page_and_the_menu_lead_to_every_page():
+    folder = TOP / "docs"
+    pages = {path.relative_to(folder).as_posix() for path in folder.rglob("*.md")}
+    assert {*re.findall(r"\]\(([^)#\s]+\.md)", (folder / "index.md").read_text("utf-8")), "index.md"} == pages
+    assert set(re.findall(r"[\w./-]+\.md", (TOP / "mkdocs.yml").read_text("utf-8"))) == pages
+
+
 def test_source_and_docs_cite_documents_of_the_repository_alone():
     paths = [*TOP.glob("*.md"), *sorted((TOP / "docs").rglob("*.md")), TOP / "Makefile"]
     paths += [TOP / path for path in list_sources(*PRODUCT, "tests")]

@@ -8,7 +8,24 @@ import pytest
 from benchmarks import __main__ as bench
 
 RESULTS = Path(bench.__file__).with_name("results.md")
-BEFORE = "# Results\n\nOld.\n\n## Markers\n\nVersion 0.1.\n\n| a |\n\n### Notes\n\nOld note.\n\n## Throws and kicks\n\nKept.\n"
+BEFORE = """# Results
+
+Old.
+
+## Markers
+
+Version 0.1.
+
+| a |
+
+### Notes
+
+Old note.
+
+## Throws and kicks
+
+Kept.
+"""
 
 
 @pytest.fixture

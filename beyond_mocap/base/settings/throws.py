@@ -75,7 +75,7 @@ TABLES = {
     ),
     "throw.examples": (
         Setting(name="action", default="throw", choices=("throw", "kick"), option="--action",
-                help="what the networks learn"),
+                help="what the examples show"),
         Setting(name="subjects", default=4, least=1, most=1000, expected="{least} to {most} subjects",
                 option="--subjects", metavar="N", help="number of subjects; default %(default)s"),
         Setting(name="throws", default=40, least=1, most=10000, expected="{least} to {most} for each subject",
