@@ -2,9 +2,10 @@
 
     python -m benchmarks [SECTION ...] [--seconds N] [--out FILE]
 
-A section that takes longer than N seconds is ended, which the results say. Results go to benchmarks/results.md, where
-sections that were not measured stay as they are; one that is measured without the recordings has the shipped sample's
-tables alone. Seconds in tables are processor time.
+A section that takes longer than N seconds is ended. Results go to benchmarks/results.md, where sections that were not
+measured stay as they are, and so does one that fails or takes too long, with a line that says so; one that is measured
+without the recordings has the shipped sample's tables alone. What was observed by hand stands in notes.md beside it and
+is appended to its section. Seconds in tables are processor time.
 """
 
 from __future__ import annotations
@@ -57,6 +58,10 @@ WITHOUT_DATA = ("methods", "experiments", "live", "throws")
 """Sections that measure on the shipped sample too; the others need the recordings."""
 LIMIT = 900.0
 """Seconds of clock time that a section may take."""
+NOTES = ROOT / "benchmarks" / "notes.md"
+_NOTES_HEADING = "### Notes"  # of what comes from NOTES, at the end of a section
+_NOT_AGAIN = "Not measured again: "  # begins the line of a section that keeps its earlier figures
+_HEAD = "# Results\n\nWritten by `make bench`, with the notes of `notes.md`; seconds are processor time.\n\n"
 
 
 def measure_section(name: str) -> list[str]:
@@ -75,38 +80,71 @@ def measure_section(name: str) -> list[str]:
     return lines
 
 
-def measure_in_subprocess(name: str, limit: float) -> tuple[list[str], bool]:
+def measure_in_subprocess(name: str, limit: float) -> tuple[list[str], str]:
     """Measure a section in a process of its own.
 
     Args:
         name: key of SECTIONS.
         limit: s of clock time.
     Returns:
-        Its lines, and whether it finished.
+        Its lines; and why there are none, "" where it finished.
     """
     command = [sys.executable, "-m", "benchmarks", name, "--here"]
     try:
         process = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, text=True, timeout=limit)
     except subprocess.TimeoutExpired:
-        return [f"Stopped after {limit:g} s: the section takes longer."], False
-    return (process.stdout.splitlines(), True) if process.returncode == 0 else (["The section failed."], False)
+        return [], f"the section takes longer than {limit:g} s."
+    return (process.stdout.splitlines(), "") if process.returncode == 0 else ([], "the section failed.")
 
 
 def read_sections(path: Path) -> dict[str, list[str]]:
-    """Read the sections of earlier results.
+    """Read the sections of earlier results, or of the notes.
 
     Args:
         path: the file; it may be missing.
     Returns:
-        Heading -> lines; what comes before the first heading is left out.
+        Heading -> lines below it, without notes; what comes before the first heading is left out.
     """
     found: dict[str, list[str]] = {}
+    is_note = False
     for line in path.read_text("utf-8").splitlines() if path.is_file() else []:
         if line.startswith("## "):
-            found[line] = []
-        if found:
+            found[line], is_note = [], False
+        elif found and not (is_note := is_note or line == _NOTES_HEADING):
             list(found.values())[-1].append(line)
     return found
+
+
+def update_section(before: list[str], lines: list[str], failure: str) -> list[str]:
+    """Build the lines of a section that has been measured.
+
+    Args:
+        before: its earlier lines, [] for none.
+        lines: what was measured now.
+        failure: why nothing was; "" where it finished.
+    Returns:
+        The new lines, or the earlier ones below a line that says why they are earlier.
+    """
+    with_what = f"Version {__version__}, Python {platform.python_version()}, numpy {np.__version__}, one core."
+    if not failure:
+        return ["", with_what, "", *lines]
+    return ["", f"{_NOT_AGAIN}{failure} {with_what}", *(line for line in before if not line.startswith(_NOT_AGAIN))]
+
+
+def format_results(parts: dict[str, list[str]], notes: dict[str, list[str]]) -> str:
+    """Format the results.
+
+    Args:
+        parts: heading of each section -> its lines.
+        notes: heading of a section -> its notes.
+    Returns:
+        The text of the file.
+    """
+    lines = [*_HEAD.splitlines(), ""]
+    for heading, part in parts.items():
+        lines += [heading, *part, ""]
+        lines += [_NOTES_HEADING, *notes[heading], ""] if heading in notes else []
+    return normalize_blank_lines("\n".join(lines))
 
 
 def main() -> int:
@@ -127,18 +165,15 @@ def main() -> int:
     if options.here:
         print("\n".join(line for name in names for line in measure_section(name)))
         return 0
-    parts, whole = read_sections(options.out), True
-    with_what = f"Version {__version__}, Python {platform.python_version()}, numpy {np.__version__}, one core."
+    parts, notes, is_whole = read_sections(options.out), read_sections(NOTES), True
     for name in names:
-        lines, has_finished = measure_in_subprocess(name, options.seconds)
-        whole &= has_finished
+        lines, failure = measure_in_subprocess(name, options.seconds)
+        is_whole &= not failure
         heading = f"## {SECTIONS[name][0]}"
-        parts[heading] = [heading, "", with_what, "", *lines]
-        print("\n".join(parts[heading]), flush=True)
-        begin = ["# Results", "", "Written by `make bench`; seconds are processor time.", ""]
-        text = "\n".join([*begin, *(line for part in parts.values() for line in [*part, ""])])
-        options.out.write_text(normalize_blank_lines(text), "utf-8")
-    return 0 if whole else 1
+        parts[heading] = update_section(parts.get(heading, []), lines, failure)
+        print("\n".join([heading, *parts[heading]]), flush=True)
+        options.out.write_text(format_results(parts, notes), "utf-8")
+    return 0 if is_whole else 1
 
 
 def normalize_blank_lines(text: str) -> str:

@@ -1,6 +1,6 @@
 """The five scenarios with two libraries: time, every figure of method `path` beside its target, and edits.
 
-The edits are those of ../shared/metrics.md, "edit time": every key moment moved by 0.2 s, earlier and later, and the
+The edits: every key moment moved by 0.2 s, earlier and later, and the
 track dragged by half a metre at a quarter, half and three quarters of its time, within a second and a half to either
 side. Measured are processor seconds from a changed plan to the new take, how much of it is new, and what shows at the
 ends of that.

@@ -110,7 +110,8 @@ points"""
 
 
 class BEYOND_MOCAP_OT_update_path(EditedBodyVerb, bpy.types.Operator):
-    """Update the motion on its path: after edits of the original action, while Live is off, or in a script"""
+    """Update the motion on its path: after edits of the original action, in a script, or while Update Automatically is
+off"""
 
     bl_idname = "beyond_mocap.update_path"
     bl_label = "Update Path"

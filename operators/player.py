@@ -223,13 +223,15 @@ versions need this once"""
                 read.append((player, strips.read_written_labels(player, settings.rate,
                                                                 tracks.read_track(settings, player))))
             except InputError as error:
-                errors.append(f"{player.name}: {error}")
+                errors.append((player.name, error))
         if not read:
-            raise InputError("no player could be added to the timeline", errors[0])
+            name, error = errors[0]
+            found, next_step = error.parts
+            raise InputError("timeline", f"no player could be added, the first is {name}: {found}", next_step=next_step)
         for player, timeline in read:
             strips.write_player_timeline(context, player, timeline)
-        for trouble in errors:
-            self.report({"WARNING"}, trouble)
+        for name, error in errors:
+            self.report({"WARNING"}, f"{name}: {error}")
         self.report({"INFO"}, f"Players added to the timeline: {len(read)}")
 
 

@@ -45,10 +45,10 @@ class BEYOND_MOCAP_OT_update(TakeOperator, bpy.types.Operator):
 
 
 class BEYOND_MOCAP_OT_update_live(TakeOperator, bpy.types.Operator):
-    """Update one player, quickly or completely; Live runs this automatically"""
+    """Update one player, quickly or completely; Update Automatically runs this after an edit"""
 
     bl_idname = "beyond_mocap.update_live"
-    bl_label = "Live Update"
+    bl_label = "Update Automatically"
     bl_options = {"UNDO", "INTERNAL"}
     pops_up = False
     player: bpy.props.StringProperty(name="Player", description="Name of the player in the list", options={"SKIP_SAVE"})
@@ -60,7 +60,7 @@ class BEYOND_MOCAP_OT_update_live(TakeOperator, bpy.types.Operator):
         """Return the one player, from its take."""
         found = context.scene.beyond_mocap.players.get(self.player)
         if found is None:
-            raise InputError("Live Update", f"no player {self.player!r}", "a player of the list")
+            raise InputError(self.bl_label, f"no player {self.player!r}", "a player of the list")
         if self.kind == "whole":  # a quick take that the narrow search did not affect only lacks its figures
             made = session.find_take(found.take)
             return [(found, orders.SynthesisMode("whole" if made is None or made.take.is_cut_short else "update"))]

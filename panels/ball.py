@@ -144,7 +144,7 @@ def draw_aimed_ball(layout, ball) -> None:
     row = layout.row(align=True)
     row.label(text=ball.name, icon="SPHERE")
     row.operator("beyond_mocap.leave_aim", text="Revert", icon="X")
-    layout.prop(settings, "live", text="Update Automatically")
+    layout.prop(settings, "live")
     column = create_value_column(layout)
     column.enabled = not settings.handed
     column.prop(settings, "target")
@@ -229,7 +229,7 @@ def draw_passing_scene(layout, context) -> None:
     row.operator("beyond_mocap.passes_from_json", text="From File", icon="IMPORT")
     row.operator("beyond_mocap.passes_to_json", text="To File", icon="EXPORT")
     with_progress(layout, context, ("passes",), draw_make_buttons)
-    layout.prop(settings, "live", text="Update Automatically")
+    layout.prop(settings, "live")
     layout.label(text="Players")
     draw_list(layout, "passers", settings, rows="players", active="active_player", operator="passes_list")
     if player := find_active_row(settings.players, settings.active_player):

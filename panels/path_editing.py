@@ -96,7 +96,7 @@ def draw_armature(layout, body, edit) -> None:
     else:
         row.operator("beyond_mocap.bake_path", text="Apply", icon="CHECKMARK")
         row.operator("beyond_mocap.leave_path", text="Revert", icon="X")
-        layout.prop(edit, "live", text="Update Automatically")
+        layout.prop(edit, "live")
         layout.operator("beyond_mocap.update_path", text="Update", icon="FILE_REFRESH")
 
 

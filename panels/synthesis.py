@@ -69,7 +69,7 @@ def draw_queue(layout, running, settings) -> None:
         if running.trouble:
             first.label(text=running.trouble, icon="ERROR")
         else:
-            first.prop(settings, "live", text="Update Automatically")
+            first.prop(settings, "live")
         second.menu("BEYOND_MOCAP_MT_presets", text="Presets")
         second.popover("BEYOND_MOCAP_PT_presets", text="", icon="PRESET_NEW")
         return

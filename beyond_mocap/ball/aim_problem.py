@@ -52,7 +52,7 @@ class AimProblem:
         if bounces < 0 or int(bounces) != bounces:
             raise InputError("aim", f"{bounces} bounces", "a whole number, 0 or more")
         if not (np.isfinite(start).all() and np.isfinite(target).all() and np.isfinite(spin).all()):
-            raise InputError("aim", "a position or spin that is NaN or infinite")
+            raise InputError("aim", "a position or spin that is NaN or infinite", "finite numbers")
         if not (np.isfinite(timed).all() and (timed > 0.0).all()):
             raise InputError("aim", f"{np.min(timed):g} s of flight", "a time of more than 0 s")
         for place in (start, target):

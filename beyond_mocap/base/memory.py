@@ -105,8 +105,8 @@ def check_memory(where: object, needed: float, next_step: str) -> None:
     """
     free = read_free_bytes()
     if free is not None and needed > free:
-        raise InputError(where, f"this needs about {_format_gigabytes(needed)} GB, {_format_gigabytes(free)} are free: "
-                                f"{next_step}")
+        raise InputError(where, f"this needs about {_format_gigabytes(needed)} GB, {_format_gigabytes(free)} are free",
+                         next_step=next_step)
 
 
 def _format_gigabytes(count: float) -> str:

@@ -27,8 +27,8 @@ def add_library(verbs) -> argparse.ArgumentParser:
     Returns:
         The parser of this verb.
     """
-    verb = verbs.add_parser("library", help="read a folder of BVH clips and annotations and describe it")
-    verb.add_argument("library", type=parse_path, metavar="LIBRARY", help="a folder with BVH files and annotations")
+    verb = verbs.add_parser("library", help="read a folder of recordings and annotations and describe it")
+    verb.add_argument("library", type=parse_path, metavar="LIBRARY", help="a folder with recordings and annotations")
     add_options(verb, "library.build")
     add_options(verb, "library")
     verb.add_argument("--report", type=parse_path, metavar="R.json", help="write what is printed, and more, as JSON")

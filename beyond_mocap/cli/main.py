@@ -136,7 +136,7 @@ def _run_command(argv: list[str] | None, writers: Mapping[str, Writer], prog: st
     try:
         argv = sys.argv[1:] if argv is None else argv
         options = build_parser(prog).parse_args(argv)
-        options.argv, options.apart = argv, run_isolated
+        options.argv, options.run_isolated = argv, run_isolated
         reporter = ProgressReporter(options.json)
         with _InterruptHandler(reporter):
             for folder in _list_libraries(options) if convert else ():

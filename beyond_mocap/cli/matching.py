@@ -68,7 +68,7 @@ def add_match(verbs):
                       help="format of the events: {}; default: detected")
     verb.add_argument("--provider", metavar="NAME", default="", action=_ProviderOption,
                       help="format of FILE: {}; default: detected")
-    verb.add_argument("--library", type=parse_path, required=True, help="a folder with BVH files and annotations")
+    verb.add_argument("--library", type=parse_path, required=True, help="a folder with recordings and annotations")
     verb.add_argument("--out", type=parse_path, required=True, metavar="FOLDER",
                       help="output folder; an unfinished run continues there")
     add_options(verb, "match.section")
@@ -102,10 +102,10 @@ def run_match(options, reporter: ProgressReporter, writers: Mapping[str, Writer]
         **{**option_values(MatchRequest, options, "match.section", "match.work", "match", "pitch", "library"),
            "players": tuple(dict.fromkeys(options.players)), "workers": options.workers or len(_list_cores())},
     )  # fmt: skip
-    if options.apart is None:
+    if options.run_isolated is None:
         result = synthesize_match(order, reporter.show_progress, reporter.is_cancelled)
     else:
-        options.apart(remove_option(options.argv, "--scene"), reporter.show_progress, reporter.is_cancelled)
+        options.run_isolated(remove_option(options.argv, "--scene"), reporter.show_progress, reporter.is_cancelled)
         result = read_result(order)
     reporter.finish(result.notes)
     for player in result.failed:

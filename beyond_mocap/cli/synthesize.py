@@ -35,7 +35,7 @@ def add_synthesize(verbs) -> argparse.ArgumentParser:
         The parser of this verb.
     """
     verb = verbs.add_parser("synthesize", help="synthesize a player's motion from track, annotations and library")
-    verb.add_argument("--library", type=parse_path, required=True, help="a folder with BVH files and annotations")
+    verb.add_argument("--library", type=parse_path, required=True, help="a folder with recordings and annotations")
     verb.add_argument("--track", type=parse_path, required=True, metavar="T.csv",
                       help="the player's track, and the ball")
     verb.add_argument("--annotations", type=parse_path, metavar="A.txt",

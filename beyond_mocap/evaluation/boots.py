@@ -1,4 +1,4 @@
-"""How deep the skin of a body's boots goes below the ground (`../shared/metrics.md`).
+"""How deep the skin of a body's boots goes below the ground: `boots` of docs/reference/report-figures.md.
 
 The boots have the soles of the drawn character (`appearance.boots`), so what is measured is what is seen. A take stands
 on the ground at height 0, a recording as it is used.

@@ -1,4 +1,6 @@
-"""What the eye sees: whether a body turns, stands, walks and looks like one person (`../shared/metrics.md`).
+"""What the eye sees: whether a body turns, stands, walks and looks like one person.
+
+The figures are those of docs/reference/report-figures.md, *What the eye sees*.
 
 The same code measures takes and recordings, both at 30 frames per second. The heading is that of the line through hips
 and shoulders; speed is the pelvis' through a window of 0.5 s; lengths are brought to a leg of 0.86 m.

@@ -1,4 +1,6 @@
-"""Whether a body moves as its mass has to: in the air, over its feet, and in bends (`../shared/metrics.md`).
+"""Whether a body moves as its mass has to: in the air, over its feet, and in bends.
+
+The figures are those of docs/reference/report-figures.md, *How the mass moves*.
 
 A body that no foot supports flies on a parabola: its centre of mass falls at 9.81 m/s^2 and keeps its speed. What it
 needs to stay up, and to turn, start and stop, its feet have to push while they are on the ground, so it leans as it is

@@ -1,6 +1,6 @@
 """How a sprinter's body looks over a stride: knees, heels, trunk, and the bounce of the centre of mass.
 
-Strides between 6 and 8 m/s count (`../shared/metrics.md` has the figures at 7 m/s).
+Strides between 6 and 8 m/s count (`sprint_form` of docs/reference/report-figures.md).
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""How a body touches the ball: feet at receptions and kicks, and swings like a kick's (`../shared/metrics.md`).
+"""How a body touches the ball: feet at receptions and kicks, and swings like a kick's.
+
+The figures are those of docs/reference/report-figures.md, *At the ball*.
 
 The same code measures takes and recordings, both at 30 frames per second. The heading is that of the line through hips
 and shoulders; speeds and lengths of the body are brought to a leg of 0.86 m. Speeds are differences over two frames.

@@ -374,12 +374,12 @@ def _restore_fields(header: dict, arrays: dict) -> dict:
     shapes = ((skeleton, row[3], row[2]) for row in header["clips"])
     motions = divide_into_motions(arrays[Path(MOTIONS).stem], shapes)
     clips, start, ball_start = [], 0, 0
-    for motion, (path, mirrored, _, count, rows, recorded, mended, is_proposed, t_pose, known) in zip(motions,
+    for motion, (path, mirrored, _, count, rows, recorded, repaired, is_proposed, t_pose, known) in zip(motions,
                                                                                                      header["clips"]):
         annotations = tuple(ClipAnnotation(first, end, key, tuple(words)) for first, end, key, words in rows)
         clips.append(Clip(path=path, mirrored=mirrored, motion=motion, annotations=annotations,
                           heel_toe_contacts=arrays["contacts"][start : start + count], recorded_count=recorded,
-                          repair_figures=mended and RepairFigures(**mended), has_proposed_labels=is_proposed,
+                          repair_figures=repaired and RepairFigures(**repaired), has_proposed_labels=is_proposed,
                           t_pose_frames=tuple(t_pose),
                           ball=arrays["balls"][ball_start : ball_start + known] if known else None))
         start, ball_start = start + count, ball_start + known

@@ -45,8 +45,7 @@ class Clip:
     Attributes:
         path: below the library's folder, with slashes.
         mirrored: whether it is the twin.
-        motion: at its own rate, metres, the floor (2nd percentile of its toe heights, ../shared/metrics.md) at height
-            0.
+        motion: at its own rate, metres, the floor (2nd percentile of its toe heights) at height 0.
         annotations: in frames of its own rate, sides swapped on the twin.
         heel_toe_contacts: (T, 2, 2) bool, left and right foot, heel and toe in contact with the ground.
         recorded_count: number of recorded frames, where a synthetic landing and getting up follow (`library.landings`);

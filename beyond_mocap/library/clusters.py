@@ -3,8 +3,7 @@
 A block of B frames starts at every frame of a clip that has B frames left. Its position is the augmented feature
 vector: the frames' features, one after the other. Eight frames of each block (every fourth of 32, every second of 16,
 all of 8) and the principal components with 98 % of the blocks' variance go into k-means: neighbouring frames carry the
-same information, and the clusters come out within a percent of those in all dimensions in a tenth of the time
-(../shared/perf.md §3).
+same information, and the clusters come out within a percent of those in all dimensions in a tenth of the time.
 """
 
 from __future__ import annotations

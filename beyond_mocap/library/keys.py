@@ -1,7 +1,7 @@
 """Key moments: which clips carry the requested labels at their key frame, and which are nearest where none does.
 
-"The library has a key moment when one clip's key frame, or its mirror's, carries all of its words"
-(../shared/contract.md); labels of a branch of the vocabulary may be left out, so carrying means being a superset.
+A library has a key moment when one clip's key frame, or its mirror image's, carries all of its labels. Labels of a
+branch of the vocabulary may be left out, so carrying means being a superset.
 """
 
 from __future__ import annotations

@@ -45,9 +45,9 @@ _POP_SECONDS = 0.04  # longer than a pop
 # mean speed v): optical recordings have 0.01 to 0.1 standing or walking and up to 0.067 v in runs, suits 0.12 to 0.25
 # at any speed
 _SLIDE_LIMIT, _SLIDE_SPEED_SHARE = 0.13, 0.065
+_LOW_SECONDS, _DRIFT = 1.5, 0.13  # window of the lowest joint, longer than a flight; metres of drift that are levelled
 # stiffness of the floor's drift and of the corrected travel: about the seconds over which they can change
-_LOW_SECONDS, _DRIFT = 1.5, 0.13
-_FLOOR_SECONDS, _TRAVEL_SECONDS = 1.5, 0.2  # how slowly the floor's height and the sliding may change
+_FLOOR_SECONDS, _TRAVEL_SECONDS = 1.5, 0.2
 _MAX_FLOOR_DRIFT = 0.02  # metres of drift that are ignored: floors are uneven, and soles lie a little differently
 _SPEED_WEIGHT = 0.005  # weight of an unchanged speed against a foot in contact
 _MAX_PELVIS_DROP = 0.10  # metres that a suit's pelvis may be too high above its feet

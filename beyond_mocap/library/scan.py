@@ -163,7 +163,7 @@ def _to_absolute(path: Path) -> Path:
 
 
 class Annotations:
-    """The annotations of a library's clips, found as ../shared/contract.md describes under "Library annotations"."""
+    """The annotations of a library's clips (docs/reference/library-folder.md, *Where labels are found*)."""
 
     def __init__(self, folder: Path, clips: list[Path], skips: Callable[[Mapping], bool] | None = None):
         """Read every table that may apply, without the rows that `skips` selects (`read_annotation_csv`); InputError

@@ -87,8 +87,8 @@ def resolve_floor_height(height: float) -> float:
 def detect_contacts(motion: Motion) -> np.ndarray:
     """Detect which foot is flat on the ground.
 
-    Flat is heel and toe (../shared/metrics.md averages the speed of both): while a foot rolls, one of them moves. On
-    recordings without sliding such stances travel a few millimetres.
+    Flat is heel and toe (docs/reference/report-figures.md averages the speed of both): while a foot rolls, one of them
+    moves. On recordings without sliding such stances travel a few millimetres.
 
     Args:
         motion: T frames, at 25 frames per second or more.

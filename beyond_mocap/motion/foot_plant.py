@@ -1,9 +1,10 @@
 """Foot planting: each stance's slide is removed by moving the foot, and the leg follows by two-bone inverse kinematics.
 
-Which frames are in contact is known from the recording and carried along (../shared/metrics.md); nothing is guessed
-from the motion itself. A stance is not pinned to one point and blended in and out. Instead each foot's shift over the
-ground is one smooth curve D(t) that cancels the velocity of the point that carries the foot while it is in contact and
-changes gently in between: the least squares problem of `solve_shift`, one banded system for the whole motion.
+Which frames are in contact is known from the recording and carried along (docs/explanation/quality.md); nothing is
+guessed from the motion itself. A stance is not pinned to one point and blended in and out. Instead each foot's shift
+over the ground is one smooth curve D(t) that cancels the velocity of the point that carries the foot while it is in
+contact and changes gently in between: the least squares problem of `solve_shift`, one banded system for the whole
+motion.
 
 A foot rolls: first the heel carries it, then the toe, on which the heel rises while it is still low and slow. Where a
 leg does not reach, people rise on their toes; so does the foot here, then the pelvis is lowered, then the stance is
@@ -278,7 +279,7 @@ def solve_limited_shift(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Solve the shift of a foot with stances relaxed that would need too large a shift.
 
-    A foot that slides looks better than a leg stretched after it (../shared/metrics.md).
+    A foot that slides looks better than a leg stretched after it.
 
     Args:
         velocity: (T - 1, 2, 2) metres per frame of heel and toe.

@@ -7,8 +7,8 @@ centre of mass that stays, the body tilts by a share of the angle, and sinks as 
 it. So do recorded bodies: trunks tilt by half the angle in bends, most of it in starts and little in stops; pelvises
 sink by 12 to 26 cm where the acceleration is 3 to 7 m/s^2.
 
-Source: ../shared/prototype-momentum.md, measured on recordings; Greene 1985, J Biomech Eng 107: the lean of runners in
-bends is atan(v^2 / (r g)).
+Source: Measured on recordings (docs/explanation/momentum.md, *Lean*); Greene 1985, J Biomech Eng 107: the lean of
+runners in bends is atan(v^2 / (r g)).
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ standing feet stay, swinging feet go with the pelvis, heels rise where a leg doe
 the plan is made again with a lower body.
 
 The root takes the whole correction. With a third of it in the trunk the head accelerates 9 % more, with two thirds 25 %
-(../shared/prototype-momentum.md); a metric over the skeleton's graph, as ProjFlow has it for corrections of single
+(docs/explanation/momentum.md); a metric over the skeleton's graph, as ProjFlow has it for corrections of single
 joints, spreads a level shift evenly over the body, which is a shift of the root.
 """
 

@@ -9,7 +9,7 @@ from .humanoid import compute_heading_from_positions, identify_joints, measure_l
 from .skeleton import Skeleton
 
 PLANT_BESIDE, PLANT_AHEAD = (0.20, 0.37), (-0.05, 0.20)
-"""Metres of the plant foot beside and ahead of the kicking ankle (`../shared/metrics.md`, row *kick*)."""
+"""Metres of the plant foot beside and ahead of the kicking ankle (targets of docs/reference/report-figures.md)."""
 
 _LEG_LENGTH = 0.86  # m of the leg for which they hold
 

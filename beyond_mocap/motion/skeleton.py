@@ -56,7 +56,8 @@ class Skeleton:
         object.__setattr__(self, "end_offsets", freeze_array(self.end_offsets).reshape(-1, 3))
         count = len(self.names)
         if not (count and len(self.parents) == len(self.offsets) == count):
-            raise InputError("skeleton", f"{count} names, {len(self.parents)} parents, {len(self.offsets)} offsets")
+            raise InputError("skeleton", f"{count} names, {len(self.parents)} parents, {len(self.offsets)} offsets",
+                             "as many of each as joints, one or more")
         if self.parents[0] != -1 or any(not 0 <= p < i for i, p in enumerate(self.parents) if i):
             raise InputError("skeleton", "joints out of order", "one root first, then parents before children")
         if len(set(self.names)) != count:

@@ -21,7 +21,7 @@ from .skeleton import Skeleton
 from .track import smooth_zero_phase_hann
 
 GRAVITY = 9.81  # m/s^2
-LOW = 0.03  # m above its own usual lowest height below which a foot carries weight (../shared/metrics.md: flight)
+LOW = 0.03  # m above its own usual lowest height below which a foot carries weight (docs/reference/report-figures.md)
 LOWEST = 5.0  # percentile of a joint's heights that is its usual lowest one
 _SHORTEST_GAP = 2.0 / 30.0  # s; shorter gaps within a stance are noise
 _RUNNING = 2.0  # m/s from which stances are lengthened

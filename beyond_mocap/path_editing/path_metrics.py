@@ -1,7 +1,7 @@
 """Evaluate a path edit: distance from the path, speed, feet and smoothness, beside the figures of the recording itself.
 
 `source` and `edited` are a `PathEditSource` and an `EditedMotion`; only their arrays are used. Definitions are those of
-`../shared/metrics.md`: the root is the pelvis behind a zero-phase Hann window of 1.5 s.
+docs/explanation/quality.md: the root is the pelvis behind a zero-phase Hann window of 1.5 s.
 """
 
 from __future__ import annotations

@@ -66,7 +66,7 @@ def plan_heading_path(track: SampledTrack, request: HeadingRequest) -> HeadingPa
         request: what is asked.
     Returns:
         The planned heading.
-    Source: Reconstructed from the rules of ../shared/metrics.md, *Heading plan*.
+    Source: The rules of docs/explanation/heading-plan.md, *What is weighed*.
     """
     weighed = weigh_headings(track, request)
     bins = find_cheapest_path(weighed.plain, weighed.plain_steps)

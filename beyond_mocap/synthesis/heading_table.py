@@ -41,8 +41,8 @@ def _build_key(row: dict[str, str], place: str) -> HeadingKey:
     if np.isnan(x) != np.isnan(y) or np.isnan(degrees) == np.isnan(x):
         given = ", ".join(name for name, value in zip(COLUMNS[1:4], (degrees, x, y)) if not np.isnan(value))
         raise InputError(place, given or "no heading", "either heading_deg, or x_m and y_m", "correct the row")
-    faced = {"target": (x, y)} if np.isnan(degrees) else {"heading": float(np.radians(degrees))}
+    direction = {"target": (x, y)} if np.isnan(degrees) else {"heading": float(np.radians(degrees))}
     try:
-        return HeadingKey(time, hold=0.0 if np.isnan(hold) else hold, **faced)
+        return HeadingKey(time, hold=0.0 if np.isnan(hold) else hold, **direction)
     except InputError as error:
         raise InputError(place, str(error)) from None

@@ -81,9 +81,10 @@ class LaunchPlanner:
             raise self._describe_too_far(f"{self.arcs.slowest:.0f} m/s or more", self.max_speed, self.human_limit)
         self._check_speed(fastest)
         self._check_elevation(min(self.max_speed, _MAX_SPEED_RATIO * fastest))
-        wishes, seed = self._rank_launch_requests(ahead), self.request.seed
-        return [(wish, seed) for wish in wishes] if len(wishes) > 1 else [(wishes[0], seed + n)
-                                                                          for n in range(MAX_PLANS)]
+        requests, seed = self._rank_launch_requests(ahead), self.request.seed
+        if len(requests) == 1:
+            return [(requests[0], seed + n) for n in range(MAX_PLANS)]
+        return [(request, seed) for request in requests]
 
     def _find_anchor(self, example, place: np.ndarray) -> np.ndarray:
         """Return the point (2,) m of an example, normalised frame, that the request positions."""
@@ -165,14 +166,14 @@ class LaunchPlanner:
                 * self.arcs.slowest)
         requests = [self._build_launch_request(float(speed), ahead) for speed in speeds]
         impacts = np.array([example.impact for example in self.launches.examples])
-        dissimilarity = [float(np.sort(compute_dissimilarity(launches, impacts, wish))[:3].mean())
-                         for wish in requests]
+        dissimilarity = [float(np.sort(compute_dissimilarity(launches, impacts, request))[:3].mean())
+                         for request in requests]
         preferred_speed = np.clip(_PREFERRED_SPEED_RATIO * self.arcs.slowest, thrown.min(), thrown.max())
         chosen: list[LaunchRequest] = []
         for number in np.argsort(dissimilarity + (np.log(speeds / preferred_speed) / _SPEED_TOLERANCE) ** 2,
                                  kind="stable"):
-            if all(abs(np.log(speeds[number] / wish.speed)) > _MIN_SPEED_DIFFERENCE
-                   for wish in chosen) and len(chosen) < MAX_PLANS:
+            if all(abs(np.log(speeds[number] / request.speed)) > _MIN_SPEED_DIFFERENCE
+                   for request in chosen) and len(chosen) < MAX_PLANS:
                 chosen.append(requests[number])
         return chosen
 

@@ -155,8 +155,8 @@ class _ThrowGenerator:
     def iter_plans(self) -> Iterator[PlannedMotion]:
         """Iterate over the plans to try: other paces, or other weights, if the first does not hit."""
         launches = self.planner.launches
-        for wish, seed in self.planner.list_launch_requests():
-            yield plan_motion(launches.examples, launches.velocities, wish, seed)
+        for request, seed in self.planner.list_launch_requests():
+            yield plan_motion(launches.examples, launches.velocities, request, seed)
 
     # Generating, and placing the motion where it is requested.
 

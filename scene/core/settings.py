@@ -133,7 +133,7 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
     rig: PointerProperty(type=BeyondMocapRig, description="Rig, bone map, baking and export")
     library_folder: StringProperty(
         name="Library", subtype="DIR_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
-        description="Folder of BVH clips with their annotations; may be relative to this file",
+        description="Folder of recordings with their annotations; may be relative to this file",
     )
     words_model: StringProperty(
         name="Learned Labels", **FILE,

@@ -155,13 +155,13 @@ class Controls:
         count = len(next(iter(turns.values())))
         turn = np.stack([turns[bone] for bone in self.bones], axis=1)
         heads, out = np.zeros((count, len(self.bones), 3)), {}
-        for i, (bone, ride) in enumerate(zip(self.bones, self.carriers)):
-            base = self._get_rotation(turn, ride.rotation_carrier) @ ride.rotation
-            origin = heads[:, ride.position_carrier] if ride.position_carrier >= 0 else 0.0
-            heads[:, i] = self._get_rotation(turn, ride.position_carrier) @ ride.position + origin
+        for i, (bone, carrier) in enumerate(zip(self.bones, self.carriers)):
+            base = self._get_rotation(turn, carrier.rotation_carrier) @ carrier.rotation
+            origin = heads[:, carrier.position_carrier] if carrier.position_carrier >= 0 else 0.0
+            heads[:, i] = self._get_rotation(turn, carrier.position_carrier) @ carrier.position + origin
             location = None
             if bone in places:
-                axes = self._get_rotation(turn, ride.axes_carrier) @ ride.axes
+                axes = self._get_rotation(turn, carrier.axes_carrier) @ carrier.axes
                 # the location channels that move the head from where its carrier puts it to the given position
                 location = np.linalg.solve(axes, (places[bone] - heads[:, i])[..., None])[..., 0]
                 heads[:, i] = places[bone]
@@ -181,13 +181,13 @@ class Controls:
         count = len(next(iter(turns.values())))
         turn = np.zeros((count, len(self.bones), 3, 3))
         heads = np.zeros((count, len(self.bones), 3))
-        for i, (bone, ride) in enumerate(zip(self.bones, self.carriers)):
-            turn[:, i] = self._get_rotation(turn,
-                                            ride.rotation_carrier) @ ride.rotation @ quaternion.to_matrix(turns[bone])
-            origin = heads[:, ride.position_carrier] if ride.position_carrier >= 0 else 0.0
-            heads[:, i] = self._get_rotation(turn, ride.position_carrier) @ ride.position + origin
-            if locations[bone] is not None and ride.axes is not None:
-                axes = self._get_rotation(turn, ride.axes_carrier) @ ride.axes
+        for i, (bone, carrier) in enumerate(zip(self.bones, self.carriers)):
+            base = self._get_rotation(turn, carrier.rotation_carrier) @ carrier.rotation
+            turn[:, i] = base @ quaternion.to_matrix(turns[bone])
+            origin = heads[:, carrier.position_carrier] if carrier.position_carrier >= 0 else 0.0
+            heads[:, i] = self._get_rotation(turn, carrier.position_carrier) @ carrier.position + origin
+            if locations[bone] is not None and carrier.axes is not None:
+                axes = self._get_rotation(turn, carrier.axes_carrier) @ carrier.axes
                 heads[:, i] += (axes @ locations[bone][..., None])[..., 0]
         return heads
 

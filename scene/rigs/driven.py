@@ -103,8 +103,8 @@ class DrivenRig:
         names = [bone_maps.JOINTS[part] for part in self.parts]
         parents, bones = [], list(self.table.values())
         for part in self.parts:
-            ride = self.controls.carriers[bones.index(self.find_bone(part))]
-            carrier = bones[ride.position_carrier] if ride.position_carrier >= 0 else None
+            control = self.controls.carriers[bones.index(self.find_bone(part))]
+            carrier = bones[control.position_carrier] if control.position_carrier >= 0 else None
             above = [p for p in self.parts if self.find_bone(p) == carrier]
             parents.append(-1 if part == "hips" else self.parts.index(above[0]) if above else 0)
         heads = self.to_metres(self.rest_heads(*self.parts))

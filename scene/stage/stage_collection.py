@@ -1,4 +1,4 @@
-"""The collection "Stage": what the extension has put on a scene's stage, told apart from what the user added to it."""
+"""The collection "Stage": what the extension has put on a scene's stage, kept apart from what the user added to it."""
 
 from __future__ import annotations
 

@@ -115,7 +115,7 @@ def _describe_moved_strip(context, strip: DrawnStrip) -> list[str]:
 
 
 def _describe_moved_moment(context, name: DrawnName) -> list[str]:
-    """Describe a key moment that is dragged; its stored line moves along, so only its new second is told."""
+    """Describe a key moment that is dragged; its stored line moves along, so only its new second is shown."""
     clock, words = find_clock(context.scene.objects[name.target]), split_labels(name.name)
     return [line for line in (f"{name.name}    {clock.to_seconds(name.frame):.2f} s",
                               describe_offer(context.scene, words, False)) if line]

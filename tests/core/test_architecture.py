@@ -223,3 +223,25 @@ def test_links_in_the_docs_lead_somewhere():
     assert [
         f"{page.name}: {link}" for page, link in links if "://" not in link and not (page.parent / link).exists()
     ] == []
+
+
+def test_the_first_page_and_the_menu_lead_to_every_page():
+    folder = TOP / "docs"
+    pages = {path.relative_to(folder).as_posix() for path in folder.rglob("*.md")}
+    assert {*re.findall(r"\]\(([^)#\s]+\.md)", (folder / "index.md").read_text("utf-8")), "index.md"} == pages
+    assert set(re.findall(r"[\w./-]+\.md", (TOP / "mkdocs.yml").read_text("utf-8"))) == pages
+
+
+def test_source_and_docs_cite_documents_of_the_repository_alone():
+    paths = [*TOP.glob("*.md"), *sorted((TOP / "docs").rglob("*.md")), TOP / "Makefile"]
+    paths += [TOP / path for path in list_sources(*PRODUCT, "tests")]
+    cited, outside = 0, []
+    for path in paths:
+        text = " ".join(path.read_text("utf-8").split())
+        outside += [f"{path.relative_to(TOP)}: {one}" for one in re.findall(r"\.\./shared/[\w-]+\.(?:md|txt)", text)]
+        for page, section in re.findall(r"\b(docs/[\w/-]+\.md)(?:,? \(?\*([^*]+)\*)?", text):
+            cited += 1
+            found = (TOP / page).read_text("utf-8") if (TOP / page).is_file() else ""
+            if not found or (section and not re.search(rf"^#+ {re.escape(section)}(?::|$)", found, re.M)):
+                outside.append(f"{path.relative_to(TOP)}: {page} {section}")
+    assert cited > 50 and outside == []

@@ -1,6 +1,7 @@
 """What `make test` tells the tests that it runs."""
 
 import os
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -28,3 +29,9 @@ def test_two_blenders_take_turns_one_tries_all_and_what_is_compiled_is_kept(tmp_
     told = dict(line.partition(" ")[::2] for line in made.stdout.splitlines() if line.startswith("test-"))
     turn = "1" if oldest else ""
     assert [told[name] for name in ("test-rooms", "test-operators", "test-oldest")] == 3 * [turn]
+
+
+def test_what_contributors_are_told_to_run_is_in_the_help():
+    named = set(re.findall(r"`make ([a-z-]+)", (TOP / "CONTRIBUTING.md").read_text("utf-8"))) - {"help"}
+    shown = re.findall(r"echo '(?:make ([a-z-]+))", (TOP / "Makefile").read_text("utf-8"))
+    assert len(named) > 10 and named <= set(shown), named - set(shown)

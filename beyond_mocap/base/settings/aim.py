@@ -14,7 +14,8 @@ TIMES = (
 
 TABLES = {
     "aim": (
-        Setting(name="live", default=True, tooltip="Update the shot while the target is dragged"),
+        Setting(name="live", default=True, title="Update Automatically", tooltip="Update the shot while the target is "
+                "dragged"),
         Setting(name="part", default="foot", choices=PARTS, tooltip="Body part that strikes the ball"),
         Setting(name="side", default="right", choices=SIDES, tooltip="Left or right body part"),
         Setting(name="bone", default="", tooltip="Bone that strikes instead of the part"),

@@ -123,7 +123,8 @@ TABLES = {
         Setting(name="seed", default=0, least=0,
                 tooltip="Start value for random choices; another value gives another solution"),
         Setting(name="start_frame", default=1, tooltip="Scene frame on which the passing scene begins"),
-        Setting(name="live", default=True, tooltip="Update the scene when a player's place or a pass is edited"),
+        Setting(name="live", default=True, title="Update Automatically", tooltip="Update the scene when a player's "
+                "place or a pass is edited"),
     ),
     "ball.hold": (
         Setting(name="hold_part", default="hand", choices=PARTS, title="Part",

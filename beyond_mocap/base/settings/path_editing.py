@@ -71,7 +71,8 @@ TABLES = {
                 help="least distance of two bodies' middles, with --avoid; default 0.6"),
         Setting(name="ground", kind=Path, option="--ground", metavar="HILL.obj", help="a mesh as ground for the "
                 "feet: metres, Y up"),
-        Setting(name="live", default=True, tooltip="Update the motion while the curve and these settings are edited"),
+        Setting(name="live", default=True, title="Update Automatically", tooltip="Update the motion while the curve "
+                "and these settings are edited"),
         Setting(name="report", kind=Path, option="--report", metavar="R.json", help="write all figures to this file"),
         Setting(name="provenance", kind=Path, option="--provenance", metavar="P.csv",
                 help="which frame each frame is from"),

@@ -2,6 +2,7 @@
 # fmt: off
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 from ..errors import InputError
 from .setting import BETWEEN, Setting
@@ -53,11 +54,14 @@ BODY = (
             "default %(default)s", title="Segment Masses", tooltip="Whose segment masses decide where the body's "
             "centre of mass is"),
     Setting(name="fatigue", default=0.0, least=0.0, most=1.0, expected=BETWEEN, option="--fatigue", metavar="SHARE",
-            help="how deeply the body breathes after sprints ('path'), 0 for not at all; default %(default)g",
-            tooltip="For Path Following: how deeply chest and shoulders breathe, and how far the trunk slumps, after "
-            "sprints; 0 keeps them as in the clips"),
+            help="how deeply the body breathes after sprints, 0 for not at all; default %(default)g",
+            tooltip="How deeply chest and shoulders breathe, and how far the trunk slumps, after sprints; 0 keeps them "
+            "as in the clips"),
 )
-"""Of a player's body; in a match they hold for all players."""
+"""Of the bodies of a match, whose players all follow their tracks."""
+_FATIGUE = replace(BODY[-1], help="how deeply the body breathes after sprints ('path'), 0 for not at all; default "
+                   "%(default)g", tooltip="For Path Following: how deeply chest and shoulders breathe, and how far the "
+                   "trunk slumps, after sprints; 0 keeps them as in the clips")
 
 TABLES = {
     "synthesis": (
@@ -157,7 +161,7 @@ TABLES = {
                 metavar="NUMBER", help="missed speed in m/s that is accepted for a clip of the style; default "
                 "%(default)g",
                 tooltip="Missed speed in m/s that is accepted for a clip of the style"),
-        *BODY,
+        *BODY[:-1], _FATIGUE,
         Setting(name="drawn_start", default=0.0, unit="seconds", title="Begins At", tooltip="Second on the clock at "
                 "which a drawn curve begins; a moving object has its own frames"),
     ),
@@ -171,8 +175,8 @@ TABLES = {
                 "match at which to begin", precision=1),
         Setting(name="section_end", default=0.0, least=0.0, unit="seconds", title="To", tooltip="Second of a whole "
                 "match at which to end; 0 for its end", precision=1),
-        Setting(name="live", default=False, tooltip="Update a player automatically after edits of the drawn track, "
-                "pins or strips: first quickly, then with the quality of Synthesize"),
+        Setting(name="live", default=False, title="Update Automatically", tooltip="Update a player after edits of the "
+                "drawn track, pins or strips: first quickly, then with the quality of Synthesize"),
         Setting(name="show_moment_names", default=True, title="Labels in Colour", tooltip="Show labels in the colours "
                 "of their actions, key moments, legend and keys over NLA editors and dope sheets"),
         Setting(name="make_bodies", default=True, title="Characters", tooltip="Create a low-poly character for each "

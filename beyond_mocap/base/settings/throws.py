@@ -40,8 +40,8 @@ TABLES = {
         Setting(name="library", default=True, title="Run-Up from Library", tooltip="Find the motion before and after "
                 "the throw among the clips of the library (step 1); otherwise the throw is blended into the armature's "
                 "own motion"),
-        Setting(name="live", default=True, title="Live Update", tooltip="Update the preview when the target is moved "
-                "or these settings change, until it is applied"),
+        Setting(name="live", default=True, title="Update Automatically", tooltip="Update the preview when the "
+                "target is moved or these settings change, until it is applied"),
     ),
     "throw.train": (
         Setting(name="action", default="throw", choices=("throw", "kick"), option="--action",
@@ -75,7 +75,7 @@ TABLES = {
     ),
     "throw.examples": (
         Setting(name="action", default="throw", choices=("throw", "kick"), option="--action",
-                help="what the networks learn"),
+                help="what the examples show"),
         Setting(name="subjects", default=4, least=1, most=1000, expected="{least} to {most} subjects",
                 option="--subjects", metavar="N", help="number of subjects; default %(default)s"),
         Setting(name="throws", default=40, least=1, most=10000, expected="{least} to {most} for each subject",

@@ -103,7 +103,7 @@ def _is_track(path: Path) -> bool:
 
 
 def _read_scenario(path: Path, fps: float, notes: list[str]) -> Scenario:
-    """Read a track and its labels; what was mended in the track is added to `notes`."""
+    """Read a track and its labels; what was repaired in the track is added to `notes`."""
     track, data = clean_track(read_track_csv(path))
     notes += [f"{path}: {line}" for line in data.lines]
     labels = find_track_labels(path)

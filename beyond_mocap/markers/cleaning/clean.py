@@ -63,7 +63,7 @@ class CleanReport:
         seen: label -> share of the frames in which the recording shows it.
         gaps: filled gaps; `how` is "cluster", "soft" or "spline".
         left: gaps that stay open.
-        swaps: `how` is "mended" or ""; the labels are in pairs.
+        swaps: `how` is "mended" (exchanged back, and corrected) or ""; the labels are in pairs.
         jumps: samples that were removed (filled again where a gap says so).
         assigned: (unlabeled marker, label).
         strayed: markers that stay far from where their carriers predict them.

@@ -27,7 +27,7 @@ LEAVE_DISTANCE = 0.10
 
 MOST_DISTANCE = 0.11
 """Metres from the smoothed track that a body stays within, also where a sharp turn of the track is smoothed away; with
-LEAST_LEEWAY that is 12 cm, as much as the noise of tracks explains (../shared/metrics.md)."""
+LEAST_LEEWAY that is 12 cm, the most that docs/reference/report-figures.md allows."""
 
 LEAST_LEEWAY, MOST_LEEWAY = 0.01, 0.04
 """Metres that a body may always stay off its planned place so that its feet rest, and that it may at most."""

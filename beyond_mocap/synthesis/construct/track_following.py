@@ -210,7 +210,7 @@ def pull_to_track(
 ) -> np.ndarray:
     """Remove the slow drift of a root from its track.
 
-    The difference of the two, both seen through a Hann window (../shared/metrics.md, root error), is removed `rounds`
+    The difference of the two, both seen through a Hann window (docs/explanation/quality.md), is removed `rounds`
     times; once would leave a third of it, since the window has no sharp edge.
 
     Args:

@@ -1,14 +1,14 @@
 """Measures of movement: following the track, sway, surge, speeds, hardness of transitions, and the feet.
 
 Pelvis (T, 2) and track (T, 2) are in metres on the pitch, one row per output frame. The *root* of
-`../shared/metrics.md` is the pelvis seen through a 1.5 s window, which removes the sway that a body must keep; the
+docs/explanation/quality.md is the pelvis seen through a 1.5 s window, which removes the sway that a body must keep; the
 track goes through the same window. Jerk, the third difference, is compared with what uncut recordings of the same speed
 show. Its index t stands for frames t .. t+3, so its middle is frame t + 1.5. A transition at frame s (the first of the
 new piece) has its middle at s - 0.5; its window of +-8 frames is jerk indices s-10 .. s+6.
 
 Feet are (T, 2, 2, 3) metres: frame, side (left, right), joint (heel, toe), world position with Z up. The heel is the
 foot (ankle) joint; a skeleton without a toe joint repeats it. Contacts are (T, 2) bool, labelled on the source clip and
-carried along, so that moving a foot cannot change what is counted (`../shared/peers.md` §3a, trap iv).
+carried along, so that moving a foot cannot change what is counted (docs/explanation/quality.md).
 """
 
 from __future__ import annotations

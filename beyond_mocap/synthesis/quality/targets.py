@@ -1,4 +1,4 @@
-"""Targets of the report's figures (`../shared/metrics.md`, last column): fixed limits, or the recordings' own."""
+"""Targets of the report's figures (docs/reference/report-figures.md): fixed limits, or the recordings' own."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Report of unmet constraints: what could not be met in a take, and at which seconds; these lines become warnings.
 
-The constraints, in the order in which they yield, are those of ../shared/metrics.md ("Where they cannot all hold":
-seconds, seam jerk, warp rate, skate, root error, key time, words, bones and ground).
+The constraints, in the order in which they yield, are those of docs/explanation/quality.md (*What yields when not
+everything fits*).
 
 Every line is about one kind and lists its stretches. It is computed from what was played, without the library's own
 figures, so it costs a synthesis a few milliseconds; jolts need those figures and are reported by `report_jolts`, with

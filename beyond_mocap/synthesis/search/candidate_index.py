@@ -247,7 +247,7 @@ def _list_pair_names() -> list[str]:
 def measure_wildness(library: Library) -> tuple[np.ndarray, np.ndarray]:
     """Compute by how much the largest jerk around each frame exceeds what is usual at its speed.
 
-    The jerk of a transition is measured over such windows (../shared/metrics.md).
+    The jerk of a transition is measured over such windows (docs/explanation/quality.md).
 
     Returns:
         (N,) and (N,) for the JERK_REACH frames before and after each frame, as a share; 0 where it does not exceed it.

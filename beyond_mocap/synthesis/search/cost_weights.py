@@ -41,6 +41,7 @@ TERMS = {
     "style": "not a clip of the style",
     "manner": "moves unlike this player",
     "variety": "does not match this player's own lag",
+    "reused": "shown by an earlier solution",
 }
 """Name of a cost term -> its description in "Why This Clip?"."""
 

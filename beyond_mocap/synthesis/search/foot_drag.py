@@ -2,7 +2,7 @@
 
 A player who arrives at a run does not stand still before a header. On that track, a clip that stands still there would
 be dragged with both feet on the ground, and no step is added around a touch. Sliding feet yield later than transitions
-(../shared/metrics.md), so the search also has such a clip without that part as a candidate.
+(docs/explanation/quality.md), so the search also has such a clip without that part as a candidate.
 """
 
 from __future__ import annotations

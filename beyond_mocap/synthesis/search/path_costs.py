@@ -252,7 +252,7 @@ class PathCosts:
         if self.request.manner_cost is not None:
             yield "manner", self.request.manner_cost[frame]
         if self.reuse_cost is not None:
-            yield "price", self.reuse_cost[frame]
+            yield "reused", self.reuse_cost[frame]
         if avoid:
             yield "avoided", AVOIDED_COST * self.index.shows_labels(avoid)[frame]
 
@@ -261,7 +261,7 @@ class PathCosts:
         """Compute the cost of pieces of key moments in a slot.
 
         Labels have no weight here except avoided ones. A kick that was recorded slower than the player runs is played
-        faster, within the limits of what may yield (../shared/metrics.md).
+        faster: the playback rate yields before feet slide (docs/explanation/quality.md).
 
         Args:
             first, end: output frames of the slot.
@@ -303,7 +303,7 @@ class PathCosts:
         if self.request.style_cost is not None:
             yield "style", self.request.style_cost[self.index.round_frame(start)]
         if self.reuse_cost is not None:
-            yield "price", self.reuse_cost[middle]
+            yield "reused", self.reuse_cost[middle]
         if self.request.avoided:
             yield "avoided", AVOIDED_COST * SLOT / length * self._shows_avoided(first, end, a, b)
 

@@ -134,3 +134,8 @@ def test_what_the_table_names_is_what_the_core_knows():
     assert find_setting("player", "strength").default == STRENGTH
     assert find_setting("player", "masses").choice_names == tuple(SEGMENT_MASSES)
     assert {row.name for row in TABLES["synthesis"]} <= set(Plan.__dataclass_fields__)
+
+
+def test_what_updates_by_itself_has_one_name():
+    titles = [row.title for rows in TABLES.values() for row in rows if row.name == "live"]
+    assert len(titles) == 5 and set(titles) == {"Update Automatically"}

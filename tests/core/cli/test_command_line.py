@@ -27,7 +27,7 @@ from beyond_mocap.synthesis.provenance import read_provenance
 TOP = Path(__file__).resolve().parents[3]
 DATA = TOP.parent / "shared" / "data"
 
-# ../shared/contract.md, Report JSON
+# keys of the report (docs/reference/report-figures.md)
 REPORT = """
 version seed fps frames duration_s seconds{load,library,search,construct,polish,total} root_error_m{mean,p95,max}
 pelvis_error_m{mean,own} keys

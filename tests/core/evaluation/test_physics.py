@@ -75,7 +75,7 @@ def test_a_flight_has_5_frames_with_both_feet_3_cm_up(frames, height, found):
 def test_a_step_has_the_mean_force_that_carries_the_body_over_it():
     steps = measure_steps(build_course(speed=6.0, stances=run(step=9.3, contact=4.8)))
     assert len(steps) == 7 and steps.force == pytest.approx(9.3 / 4.8)
-    assert steps.usual == pytest.approx(1.93, abs=0.1)  # .309 s over .160 s (../shared/prototype-momentum.md)
+    assert steps.usual == pytest.approx(1.93, abs=0.1)  # .309 s over .160 s
 
 
 @pytest.mark.parametrize("stances, speed", [

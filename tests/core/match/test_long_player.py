@@ -62,7 +62,7 @@ def test_a_whole_motion_and_its_parts_are_the_same_file(library, tmp_path):
 def test_a_work_that_needs_more_memory_than_is_free_is_refused_in_one_line(monkeypatch):
     monkeypatch.setattr(memory, "read_free_bytes", lambda: 3e9)
     memory.check_memory("t.csv", 2.9e9, "use --window")
-    with pytest.raises(InputError, match=r"^t.csv: this needs about 5.0 GB, 3.0 are free: use --window$"):
+    with pytest.raises(InputError, match=r"^t.csv: this needs about 5.0 GB, 3.0 are free; use --window$"):
         memory.check_memory("t.csv", 5e9, "use --window")
     monkeypatch.setattr(memory, "read_free_bytes", lambda: None)
     memory.check_memory("t.csv", 1e15, "")

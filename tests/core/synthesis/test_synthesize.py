@@ -38,7 +38,7 @@ def take_of(library, track_of, timeline_of):
 
 
 def root_error(take, track) -> np.ndarray:
-    """(T,) m: pelvis and track behind the same zero-phase Hann window of 1.5 s, as metrics.md defines it."""
+    """(T,) m: pelvis and track behind the same zero-phase Hann window of 1.5 s."""
     fps = take.motion.fps
     sampled = sample_track(track, fps)
     pelvis = smooth_zero_phase_hann(take.motion.root_positions[:, :2], fps, 1.5)

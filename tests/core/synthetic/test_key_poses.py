@@ -53,7 +53,7 @@ def build():
 def test_no_part_of_the_body_is_below_the_ground(build, name):
     one = build(name)
     heights = [place[:, 2].min() for _, place, _ in iter_surface(one.motion.skeleton, one.places, one.world)]
-    assert min(heights) > -0.02  # as deep as the eye forgives a boot (../shared/metrics.md, boots)
+    assert min(heights) > -0.02  # as deep as the eye forgives a boot (`boots.below_share`)
     trunk = {BODY.hips, *BODY.spine, BODY.head}
     assert min(one.places[:, joint, 2].min() for joint in trunk) > 0.06
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from beyond_mocap.synthesis.search.candidate_index import PLAYBACK_RATES, SLOT, STRIKE_COST
-from beyond_mocap.synthesis.search.cost_weights import Weights
+from beyond_mocap.synthesis.search.cost_weights import TERMS, Weights
 from beyond_mocap.synthesis.search.path_costs import PathCosts
+from beyond_mocap.synthesis.search.preferences import REUSE_COST, UsedStretch
 
 NORMAL = int(np.flatnonzero(PLAYBACK_RATES == 1.0)[0])
 NONE = Weights(**{name: 0.0 for name in vars(Weights())})
@@ -88,3 +89,13 @@ def test_the_cheapest_are_the_cheapest(library, order, track_of):
     whole = np.sort(found.compute_misfit(60, 68, *every))
     assert np.allclose(np.sort(cost), whole[:20], atol=1e-5)
     assert np.allclose(cost, found.compute_misfit(60, 68, number, frame), atol=1e-5)
+
+
+def test_every_term_has_a_text_also_what_an_earlier_solution_showed(library, order):
+    asked, clip = order((0.0, 8.0, "jogging")), np.array([0])
+    found = PathCosts(library, asked, used=(UsedStretch(library.clips[0].path, False, 0.0, 30.0),))
+    frame = library.frames.first[clip]
+    terms = dict(found.iter_misfit_terms(60, 60 + SLOT, np.array([NORMAL]), frame))
+    key_terms = dict(found.iter_key_terms(60, 60 + SLOT, clip, frame.astype(float), np.ones(1)))
+    assert {*terms, *key_terms} <= set(TERMS)
+    assert terms["reused"] == REUSE_COST == key_terms["reused"]
