@@ -149,7 +149,7 @@ class LiveHits:
         return measures
 
 
-def build_recording(listener: Listener, seconds: float, rate: float | None = None) -> Motion | None:
+def build_recording(listener: Listener, seconds: float) -> Motion | None:
     """Build a motion from the last seconds of a stream.
 
     Networks deliver frames in bursts, so the frames are spaced evenly from the first to the last.
@@ -157,7 +157,6 @@ def build_recording(listener: Listener, seconds: float, rate: float | None = Non
     Args:
         listener: the listener.
         seconds: how much of the stream.
-        rate: most frames per second; None: all.
     Returns:
         The motion, or None if there are fewer than two frames.
     """
@@ -165,7 +164,7 @@ def build_recording(listener: Listener, seconds: float, rate: float | None = Non
     frames = [frame for frame in frames if frame.time > frames[-1].time - seconds]
     if len(frames) < 2 or frames[-1].time <= frames[0].time:
         return None
-    frames, fps = _choose_frames(frames, rate)
+    frames, fps = _choose_frames(frames)
     return Motion(*convert_poses(frames), fps)
 
 

@@ -26,6 +26,7 @@ from ..moves import build_standing
 from .action import ActionSetting
 from .flight import apply_flight
 
+_LEAD_SECONDS, _REST_SECONDS = 1.2, 0.8  # s of running or standing before the key poses, and of standing after them
 _ROUNDING_SECONDS = 0.02  # s over which corners of the tables are rounded
 _FOOT_EASE = 0.16  # s in which a foot passes from its step to the key poses
 _PASSES = 3  # of fitting the height of a resting body, whose legs follow the hips
@@ -72,19 +73,17 @@ class BodyPoses:
     flight: tuple[float, float] | None = None
 
 
-def build_body_poses(poses: BodyPoses, setting: ActionSetting, lead: float = 1.2, rest: float = 0.8) -> Gesture:
+def build_body_poses(poses: BodyPoses, setting: ActionSetting) -> Gesture:
     """Build a movement from its key poses.
 
     Args:
         poses: the key poses.
         setting: for whom.
-        lead: s of running or standing before the key poses begin.
-        rest: s of standing after they end.
     Returns:
         The movement; it lasts from the key poses' beginning to their end.
     """
-    key = lead - poses.begin[0]
-    frames = int(round((key + poses.end + rest) * setting.fps)) + 1
+    key = _LEAD_SECONDS - poses.begin[0]
+    frames = int(round((key + poses.end + _REST_SECONDS) * setting.fps)) + 1
     times = np.arange(frames) / setting.fps - key
     run, plan = _build_run(poses, setting, times, key)
     posture = _blend_poses(poses, setting, times, run, plan)
