@@ -14,6 +14,7 @@ from .chain import CONJUGATE, Chain, Poses, limit_angles, multiply, read_angles,
 
 # weight of the next joint's markers relative to a joint's own; again this factor for each joint below
 _BELOW_FACTOR = 0.01
+_UNTURNED = np.array([[1.0], [0.0], [0.0], [0.0]])
 _PARENT_WEIGHT = 4e-4  # m2, weight of the parent's direction, for angles that markers do not determine
 
 
@@ -44,7 +45,8 @@ def estimate_initial_poses(chain: Chain, seen: np.ndarray, weights: np.ndarray) 
         near = np.flatnonzero(np.isfinite(distance[joint]))
         share = weights[near] * _BELOW_FACTOR ** distance[joint][near][:, None]
         arms = rest[near] - chain.skeleton.rest_positions[joint]
-        world.append(_fit_joint(arms, seen[near] - joints[joint], share, world[parent]))
+        prior = multiply(world[parent], _UNTURNED)  # of unit length again
+        world.append(_fit_joint(arms, seen[near] - joints[joint], share, prior))
         local[joint] = multiply(world[parent] * CONJUGATE, world[joint])
         if not chain.is_fully_free[joint]:
             angles[joint] = limit_angles(chain, joint, read_angles(chain, joint, local[joint]))
