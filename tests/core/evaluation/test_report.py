@@ -12,7 +12,7 @@ from beyond_mocap.annotation import KeyMoment, Span, Timeline, labels_per_frame
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.evaluation.annotation_similarity import fill_automatic_spans
 from beyond_mocap.evaluation.naturalness import measure_course
-from beyond_mocap.evaluation.report import evaluate, evaluate_played, flatten_report, format_table
+from beyond_mocap.evaluation.report import evaluate, evaluate_played, flatten_report
 from beyond_mocap.files import tables
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.build import build_library
@@ -448,19 +448,8 @@ def test_wrong_provenance_and_wrong_skeleton_are_told(uncut, library):
         evaluate_played(playback_from_tables(taller, provenance), library=library)
 
 
-def test_table_puts_reports_side_by_side(uncut, track_of, library):
-    report = evaluate(replace(uncut, timeline=Timeline(keys=(KeyMoment(14.5, ("kick",)),))), track_of(uncut), library)
-    lines = format_table({"path": report, "blocks": {**report, "seed": 7, "loop_share": None}}).splitlines()
-    assert lines[0] == "| figure | path | blocks |"
-    assert "| seed | 0 | 7 |" in lines and "| loop_share | 0 | - |" in lines
-    assert any(line.startswith("| root_error_m.mean |") for line in lines)
-    assert any(line.startswith("| keys 1.labels | kick |") for line in lines)
-    assert all(line.count("|") == 4 for line in lines)
-
-
 def test_a_report_that_is_nested_too_deep_is_told():
     deep = json.loads('{"a":' * 900 + "1" + "}" * 900)
-    for made in (flatten_report, lambda report: format_table({"one": report})):
-        with pytest.raises(InputError, match="report: nested more than 30 levels deep"):
-            made(deep)
+    with pytest.raises(InputError, match="report: nested more than 30 levels deep"):
+        flatten_report(deep)
     assert flatten_report({"a": {"b": [{"c": 1}, {"c": 2}]}}) == {"a.b 1.c": 1, "a.b 2.c": 2}
