@@ -15,6 +15,7 @@ from itertools import islice
 
 import numpy as np
 
+from ...annotation.striking import SIDED_PARTS
 from ...ball.contact import Tool
 from ...motion.motion import Motion, forward_kinematics
 from ..hits import HitMotion, detect_hit_under_way, detect_hits
@@ -48,7 +49,7 @@ class LiveHits:
     def __init__(self, listener: Listener, part: str = "foot", side: str = "", threshold: float | None = None,
                  tool: Tool | None = None):
         self.listener, self.part, self.threshold, self.tool = listener, part, threshold, tool
-        sided = part in ("foot", "hand", "tool")
+        sided = part in SIDED_PARTS
         self.sides = ((side,) if side else ("left", "right")) if sided else ("",)
         self._after = self._seen_until = float("-inf")
         self._last_number = 0
