@@ -22,8 +22,8 @@ from ..library.clip import Clip
 from ..library.library import Library
 from . import analysis_cache as kept
 from .hits import HitMotion, build_hit_at, detect_hits
+from .pass_scene import KINDS
 
-KINDS = ("toss", "pass", "attack")
 # m/s of the part between toss and pass, and between pass and attack (section 5 divides them by highest speed)
 _KIND_SPEEDS = {"foot": (4.5, 7.5), "hand": (4.0, 7.0), "head": (2.0, 3.5), "chest": (1.0, 2.0), "tool": (8.0, 13.0)}
 _LEAST_TOUCH_SPEED = 0.3  # m/s: least speed of a part whose labels say that it touches the ball

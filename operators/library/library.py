@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from ...beyond_mocap.library.library import Library
 
 
-MAX_LEFT_OUT = 12  # stretches left out of locomotion that the panel lists
 
 
 class FolderOperator(BackgroundOperator):
@@ -212,7 +211,7 @@ def describe_gaps(library: "Library") -> str:
     """
     from ...beyond_mocap.library.left_out import describe_left_out
 
-    missing, left_out = list(library.coverage.lines.values()), describe_left_out(library, MAX_LEFT_OUT)
+    missing, left_out = list(library.coverage.lines.values()), describe_left_out(library)
     labels = [*library.proposal_notes, *library.unlabelled_notes]
     parts = ["Proposed labels"] if library.proposal_notes else []
     parts += ["Clips without labels"] if library.unlabelled_notes else []

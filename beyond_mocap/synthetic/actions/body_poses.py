@@ -16,6 +16,7 @@ from ...motion import quaternion
 from ...motion.motion import Motion
 from ...motion.retargeting.neutral import NeutralStance
 from ...motion.retargeting.posture import Posture, to_motion
+from ...motion.supports import GRAVITY
 from .. import gait_tables as tables
 from ..footsteps import compute_ground_lift
 from ..gait import build_posture, plan_footsteps
@@ -195,12 +196,12 @@ def compute_flight(times: np.ndarray, height: np.ndarray, take_off: float, landi
 
     low, high = np.interp([take_off, landing], times, height)
     length = landing - take_off
-    rise = (high - low) / length + 0.5 * tables.GRAVITY * length
+    rise = (high - low) / length + 0.5 * GRAVITY * length
     since = times - take_off
-    free = low + rise * since - 0.5 * tables.GRAVITY * since**2
+    free = low + rise * since - 0.5 * GRAVITY * since**2
     out = np.where((times >= take_off) & (times <= landing), free, height)
     reach = min(0.25, length)
-    for edge, value, slope, sign in ((take_off, low, rise, -1.0), (landing, high, rise - tables.GRAVITY * length, 1.0)):
+    for edge, value, slope, sign in ((take_off, low, rise, -1.0), (landing, high, rise - GRAVITY * length, 1.0)):
         far = edge + sign * reach
         inside = (times - edge) * sign > 0.0
         inside &= (times - far) * sign < 0.0
