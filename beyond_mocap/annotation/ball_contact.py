@@ -9,6 +9,7 @@ import numpy as np
 from ..motion.skeleton import Skeleton
 from .labels import find_label, list_labels, read_labels
 from .striking import Surface, build_part_surfaces, measure_smallest_gap
+from .timeline import KeyMoment
 from .vocabulary import SIDES
 
 _BY_PART = {part: frozenset(list_labels(part=part)) for part in ("head", "chest", "hand", "thigh", "foot")}
@@ -64,6 +65,16 @@ def choose_contact_labels(played: Iterable[str], requested: Iterable[str]) -> tu
     only_carries = bool(CARRYING.intersection(played)) and not (TAKING | SENDING).intersection(played)
     is_other = only_carries and not CARRYING.intersection(requested) and find_striking_part(requested) is not None
     return played if find_striking_part(played) and not is_other else requested
+
+
+def list_contact_labels(played: Iterable[str], requested: KeyMoment) -> tuple[str, ...]:
+    """List the labels that define the body part at a key moment; none if it misses the ball by design.
+
+    Args:
+        played: the labels of the clip.
+        requested: the key moment.
+    """
+    return () if requested.misses_ball else choose_contact_labels(played, requested.words)
 
 
 def find_contact_window(labels: Iterable[str]) -> float:

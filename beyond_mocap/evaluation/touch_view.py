@@ -12,7 +12,7 @@ from ..annotation.body_solid import BodySolid
 from ..annotation.body_surfaces import BodySurface, build_body_surfaces
 from ..annotation.striking import build_part_surfaces, measure_smallest_gap
 from ..annotation.vocabulary import SIDES
-from ..synthesis.quality.moments import KeyMomentResult, list_contact_labels
+from ..synthesis.quality.moments import KeyMomentResult
 from . import touches
 from .view import View
 
@@ -105,7 +105,7 @@ class TouchView:
 
     def find_foot(self, moment: KeyMomentResult) -> int | None:
         """Find which foot touches the ball: the one that labels name, else the one nearest to the ball."""
-        side = touches.find_side(list_contact_labels(moment))
+        side = touches.find_side(moment.contact_labels)
         ball = self.ball[moment.frame]
         if side is not None or not np.isfinite(ball).all():
             return side
