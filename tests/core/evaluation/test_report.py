@@ -30,6 +30,8 @@ from tests.core.report_contract import GROUPS, assert_contract
 
 FPS = 30.0
 KEY_FRAME = 300
+
+
 @pytest.fixture(scope="session")
 def uncut(cut):
     return cut(("jog.bvh", 30, 300))
