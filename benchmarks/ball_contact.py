@@ -11,7 +11,7 @@ from benchmarks import effort
 from benchmarks.effort import format_head, format_row
 from benchmarks.places import LIBRARIES, ROOT, library_folder, read_scenario
 from beyond_mocap.ball.contact import find_striking_surface
-from beyond_mocap.evaluation.report import evaluate, format_cell
+from beyond_mocap.evaluation.report import evaluate
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.library import Library
 from beyond_mocap.motion.motion import compute_pose
@@ -80,8 +80,12 @@ def build_take_rows(name: str, library: Library) -> list[str]:
             if gap is not None and np.isfinite(gap):
                 rows.append(format_row([f"{name}, scenario {number}", " ".join(key["labels"]), f"{key['time_s']:.2f}",
                                         "-" if moved is None else f"{moved:.2f}", f"{1000 * gap:.1f}",
-                                        format_cell(key["ball_shift_m"]), format_cell(key["time_error_s"])]))
+                                        _format_cell(key["ball_shift_m"]), _format_cell(key["time_error_s"])]))
     return rows
+
+
+def _format_cell(value: float | None) -> str:
+    return "-" if value is None else f"{value:.4g}"
 
 
 def section() -> list[str]:

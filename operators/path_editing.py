@@ -6,18 +6,12 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from ..beyond_mocap.base.errors import BeyondMocapError, InputError, format_count
+from ..beyond_mocap.base.settings.path_editing import CURVES
 from ..scene.core import channels
 from ..scene.core.measure import units_per_metre
 from ..scene.path_editing import collision_avoidance as keep_apart
 from ..scene.path_editing import edited_bodies, live
-from ..scene.path_editing.settings import (
-    KINDS,
-    MOST_DEGREE,
-    SHAPES,
-    list_edited_bodies,
-    list_target_bodies,
-    select_object,
-)
+from ..scene.path_editing.settings import MOST_DEGREE, SHAPES, list_edited_bodies, list_target_bodies, select_object
 from .operator_base import NEEDS_NO_EDITING, BaseOperator
 
 
@@ -40,7 +34,7 @@ a selected curve"""
     bl_idname = "beyond_mocap.edit_path"
     bl_label = "Edit Path"
     count: IntProperty(**COUNT)
-    kind: EnumProperty(name="Curve", items=KINDS, default="BEZIER", description="Kind of the new curve")
+    kind: EnumProperty(name="Curve", items=CURVES, default="BEZIER", description="Kind of the new curve")
     degree: IntProperty(**DEGREE)
     straight: BoolProperty(name="Straight", description="A straight line as long as the original path")
     needs = (*NEEDS_NO_EDITING, "Select an armature with a motion, and optionally a curve as its new path",
@@ -94,7 +88,7 @@ points"""
     bl_label = "New Curve"
     shape: EnumProperty(name="Shape", items=SHAPES, default="FITTED", description="Shape of the new curve")
     count: IntProperty(**COUNT)
-    kind: EnumProperty(name="Curve", items=KINDS, default="BEZIER", description="Kind of the new curve")
+    kind: EnumProperty(name="Curve", items=CURVES, default="BEZIER", description="Kind of the new curve")
     degree: IntProperty(**DEGREE)
     needs = (*NEEDS_NO_EDITING, "Select an armature that follows a path, or its curve",
              lambda context: bool(list_target_bodies(context)))

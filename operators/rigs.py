@@ -9,7 +9,6 @@ from bpy_extras.io_utils import ExportHelper, ImportHelper
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.base.fixes import Fix
 from ..beyond_mocap.files.bvh import bvh
-from ..scene.characters import player_character
 from ..scene.core import action, channels, session, take_record, window
 from ..scene.core.settings import find_active_player, to_absolute_path
 from ..scene.match import match_objects
@@ -278,19 +277,14 @@ stays unchanged"""
 
     def list_rigs(self, context) -> list[bpy.types.Object]:
         """List the armatures to export."""
-        settings = context.scene.beyond_mocap
         if self.who == "SELECTED":
             return [one for one in context.selected_objects if one.type == "ARMATURE"]
-        if self.who == "PLAYERS":
-            chosen = [player_character.find_shown_body(player) for player in settings.players if player.use]
-            return [one for one in chosen if one is not None]
+        settings = context.scene.beyond_mocap
         player = find_active_player(settings)
-        if settings.rig.target is not None and (settings.rig.source or player is None or player.rig is None):
+        if self.who == "ACTIVE" and settings.rig.target is not None and (
+                settings.rig.source or player is None or player.rig is None):
             return [settings.rig.target]
-        if player is not None and player_character.find_shown_body(player) is not None:
-            return [player_character.find_shown_body(player)]
-        active = context.object
-        return [active] if active is not None and active.type == "ARMATURE" else []
+        return engine_files.list_delivered_rigs(context, self.who)
 
     def read_root(self, context) -> tuple:
         """Read the joints above the hips in the library's recordings; InputError without a built library."""

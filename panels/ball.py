@@ -10,6 +10,7 @@ from ..scene.passes.settings import (
     find_armature,
     find_ball,
     find_picture_icon,
+    needs_side,
     parse_lines,
     show_label,
 )
@@ -157,7 +158,7 @@ def draw_aimed_ball(layout, ball) -> None:
     column.prop(settings, "body")
     if settings.body is not None:
         column.prop(settings, "part")
-        if settings.part in {"foot", "hand", "tool"} and not settings.bone:
+        if needs_side(settings):
             column.prop(settings, "side")
         column.prop_search(settings, "bone", settings.body.data, "bones")
         pair = column.column(align=True)
@@ -265,7 +266,7 @@ def draw_player(layout, player) -> None:
     column = create_value_column(layout)
     for name in ("place", "body", "part"):
         column.prop(player, name)
-    if player.part in {"foot", "hand", "tool"} and not player.bone:
+    if needs_side(player):
         column.prop(player, "side")
     if player.part == "tool":
         for name in ("tool_length", "tool_reach", "tool_radius"):

@@ -9,6 +9,7 @@ import numpy as np
 from ..motion.skeleton import Skeleton
 from .labels import find_label, list_labels, read_labels
 from .striking import Surface, build_part_surfaces, measure_smallest_gap
+from .timeline import KeyMoment
 from .vocabulary import SIDES
 
 _BY_PART = {part: frozenset(list_labels(part=part)) for part in ("head", "chest", "hand", "thigh", "foot")}
@@ -24,7 +25,9 @@ _FOOT_ON_BALL = tuple(
 )  # fmt: skip
 _FOOT_OR_OTHER = frozenset(label.name for label in read_labels().values() if "foot" in label.parts and not label.part)
 _FOOT_TAKES = frozenset(list_labels(ball="takes", part="foot", is_root=True))
-_TAKES, _SENDS, _CARRIES = (frozenset(list_labels(ball=what)) for what in ("takes", "sends", "carries"))
+TAKING, SENDING, CARRYING = (frozenset(list_labels(ball=what)) for what in ("takes", "sends", "carries"))
+"""The labels of motions that take, send and carry the ball."""
+
 _STATED = frozenset({"foot", *list_labels(group="height"), *list_labels(group="surface")})
 _PART_BY_HEIGHT = (
     (0.45, ("foot", "low")), (0.75, ("foot", "high")), (1.05, ("thigh",)), (1.55, ("body",)), (np.inf, ("head",)),
@@ -59,9 +62,19 @@ def choose_contact_labels(played: Iterable[str], requested: Iterable[str]) -> tu
         requested does not name that touch's part.
     """
     played, requested = tuple(played), tuple(requested)
-    only_carries = bool(_CARRIES.intersection(played)) and not (_TAKES | _SENDS).intersection(played)
-    is_other = only_carries and not _CARRIES.intersection(requested) and find_striking_part(requested) is not None
+    only_carries = bool(CARRYING.intersection(played)) and not (TAKING | SENDING).intersection(played)
+    is_other = only_carries and not CARRYING.intersection(requested) and find_striking_part(requested) is not None
     return played if find_striking_part(played) and not is_other else requested
+
+
+def list_contact_labels(played: Iterable[str], requested: KeyMoment) -> tuple[str, ...]:
+    """List the labels that define the body part at a key moment; none if it misses the ball by design.
+
+    Args:
+        played: the labels of the clip.
+        requested: the key moment.
+    """
+    return () if requested.misses_ball else choose_contact_labels(played, requested.words)
 
 
 def find_contact_window(labels: Iterable[str]) -> float:
@@ -161,7 +174,7 @@ def takes_and_sends(a: frozenset[str], b: frozenset[str]) -> bool:
         a: the labels of one motion.
         b: the labels of the other.
     """
-    (a_takes, a_sends), (b_takes, b_sends) = ((bool(_TAKES & labels), bool(_SENDS & labels)) for labels in (a, b))
+    (a_takes, a_sends), (b_takes, b_sends) = ((bool(TAKING & labels), bool(SENDING & labels)) for labels in (a, b))
     return a_takes != a_sends and a_takes == b_sends and a_sends == b_takes
 
 

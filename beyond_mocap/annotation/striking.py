@@ -19,6 +19,9 @@ from ..motion.skeleton import Skeleton
 from ..motion.track import BALL_RADIUS
 
 BODY_PARTS = ("foot", "head", "chest", "hand")
+SIDED_PARTS = ("foot", "hand", "tool")
+"""Parts that strike on the left or the right; a tool is held in a hand."""
+
 # Metres.
 FOOT_RADIUS, THIGH_RADIUS, HEAD_RADIUS, CHEST_RADIUS, HAND_RADIUS = 0.05, 0.08, 0.10, 0.12, 0.05
 _THIGH_SHARE = 0.6  # of the thigh from hip to knee, where a ball lands on it

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..annotation.striking import BODY_PARTS, Surface, build_part_surfaces
+from ..annotation.striking import BODY_PARTS, SIDED_PARTS, Surface, build_part_surfaces
 from ..base.errors import InputError
 from ..base.vectors import unit_vector, unit_vectors
 from ..motion import quaternion
@@ -73,7 +73,7 @@ def find_striking_surface(skeleton: Skeleton, part: str, side: str = "", tool: T
     Raises:
         InputError: if a side is missing or the skeleton lacks the part.
     """
-    if part in ("foot", "hand", "tool") and side not in ("left", "right"):
+    if part in SIDED_PARTS and side not in ("left", "right"):
         raise InputError("part", f"{part} of side {side!r}", "left or right")
     if part == "tool":
         return _build_tool_surface(skeleton, side, tool or Tool())

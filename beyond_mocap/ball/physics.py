@@ -191,22 +191,6 @@ def compute_deceleration(speed: np.ndarray, ball: Ball) -> np.ndarray:
     return ball.rolling + ball.linear_drag * speed + ball.drag * speed**2
 
 
-def compute_energy(position: np.ndarray, velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> np.ndarray:
-    """Compute the energy of balls: translation, rotation, and height of the centre above z = 0.
-
-    Args:
-        position: (..., 3) m.
-        velocity: (..., 3) m/s.
-        spin: (..., 3) rad/s.
-        ball: the ball's physics.
-    Returns:
-        (...,) J.
-    """
-    translation = 0.5 * np.einsum("...i,...i->...", velocity, velocity)
-    rotation = 0.5 * ball.inertia * ball.radius**2 * np.einsum("...i,...i->...", spin, spin)
-    return ball.mass * (translation + rotation + ball.gravity * position[..., 2])
-
-
 def _compute_contact_push(velocity, spin, ball: Ball, most) -> np.ndarray:
     """Compute the horizontal velocity change (..., 3) m/s that stops the lowest point, limited to `most` (...,) m/s."""
     push = compute_slip(velocity, spin, ball) * (-ball.inertia / (1.0 + ball.inertia))

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..motion.supports import GRAVITY
 from ..motion.track import BALL_RADIUS
 from .physics import FOOTBALL, compute_deceleration
 
-_GRAVITY, _BOUNCE = 9.81, 0.55
+_BOUNCE = 0.55
 _ON_GROUND = 0.03  # m above its radius up to which a ball counts as rolling
 _MIN_HOP_HEIGHT = 0.02  # m; a lower hop counts as rolling
 # m above the ground up to which the ground alone lifts a rolling ball to a foot: half its size; feeds' heights of
@@ -102,8 +103,8 @@ def _compute_heights(starts: np.ndarray, ends: np.ndarray, seconds, at: np.ndarr
         if max(start - _ON_GROUND, end - _BOBBLE) <= BALL_RADIUS:
             out[pair] = _simulate_bobble(end, until, at)
         elif end > BALL_RADIUS + _ON_GROUND:
-            upward = (end - start) / until + 0.5 * _GRAVITY * until
-            out[pair] = np.maximum(start + upward * at - 0.5 * _GRAVITY * at**2, BALL_RADIUS)
+            upward = (end - start) / until + 0.5 * GRAVITY * until
+            out[pair] = np.maximum(start + upward * at - 0.5 * GRAVITY * at**2, BALL_RADIUS)
             height_error[pair] = max(out[pair, at < until].max(initial=0.0) - max(start, end), 0.0)
         else:
             out[pair] = _simulate_hops(start, at)
@@ -113,7 +114,7 @@ def _compute_heights(starts: np.ndarray, ends: np.ndarray, seconds, at: np.ndarr
 
 def _simulate_bobble(end: float, until: float, at: np.ndarray) -> np.ndarray:
     """Simulate a rolling ball that rises last, with its top `end` m at `until` s; (D,) m at times `at` (D,) s."""
-    return np.maximum(end - 0.5 * _GRAVITY * (until - at) ** 2, BALL_RADIUS)
+    return np.maximum(end - 0.5 * GRAVITY * (until - at) ** 2, BALL_RADIUS)
 
 
 def _simulate_hops(start: float, at: np.ndarray) -> np.ndarray:
@@ -121,10 +122,10 @@ def _simulate_hops(start: float, at: np.ndarray) -> np.ndarray:
     above = max(start - BALL_RADIUS, 0.0)
     if above < _MIN_HOP_HEIGHT:
         return np.full(len(at), BALL_RADIUS)
-    out = above - 0.5 * _GRAVITY * at**2
-    lands, up = np.sqrt(2.0 * above / _GRAVITY), np.sqrt(2.0 * above * _GRAVITY) * _BOUNCE
-    while up**2 / (2.0 * _GRAVITY) > _MIN_HOP_HEIGHT:
+    out = above - 0.5 * GRAVITY * at**2
+    lands, up = np.sqrt(2.0 * above / GRAVITY), np.sqrt(2.0 * above * GRAVITY) * _BOUNCE
+    while up**2 / (2.0 * GRAVITY) > _MIN_HOP_HEIGHT:
         since = at - lands
-        out = np.where(since > 0.0, up * since - 0.5 * _GRAVITY * since**2, out)
-        lands, up = lands + 2.0 * up / _GRAVITY, up * _BOUNCE
+        out = np.where(since > 0.0, up * since - 0.5 * GRAVITY * since**2, out)
+        lands, up = lands + 2.0 * up / GRAVITY, up * _BOUNCE
     return BALL_RADIUS + np.where(at < lands, np.maximum(out, 0.0), 0.0)

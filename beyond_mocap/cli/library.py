@@ -16,7 +16,6 @@ from .outputs import ProgressReporter, Writer, check_outputs
 
 # Header of the table of proposed labels.
 PROPOSAL_COLUMNS = ("file", "fps", "start_frame", "end_frame", "key_frame", "labels", "confidence", "source", "why")
-MAX_LEFT_OUT = 12  # stretches left out of locomotion that are printed
 
 
 def add_library(verbs) -> argparse.ArgumentParser:
@@ -83,7 +82,7 @@ def summarize_library(library) -> dict:
         "key moments: " + ("" if keys else "none"), *(f"  {key}" for key in keys),
         *library.proposal_notes, *library.unlabelled_notes,
         *library.coverage.lines.values(),
-        *describe_left_out(library, MAX_LEFT_OUT),
+        *describe_left_out(library),
         *library.notes,
     ]
     return {

@@ -8,6 +8,7 @@ import time
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..base.errors import InputError, NotInLibraryError, format_count
 from ..base.memory import check_memory
@@ -17,6 +18,12 @@ from ..base.settings.options import add_options, name_options, option_values, pa
 from .comparing import run_comparison
 from .library import check_library_options, open_library
 from .outputs import ProgressReporter, Writer, add_take_files, check_outputs, choose_writer, locate_errors
+
+if TYPE_CHECKING:  # imported where they are used: the command line starts at once
+    from ..annotation import Timeline
+    from ..library.library import Library
+    from ..motion.track import Track
+    from ..synthesis.plan import Plan
 
 LONG_TRACK = 1200.0  # s of a track from which on it is done in windows
 _WINDOW_LIMITS = (2.0 * OVERLAP, 3600.0)  # s
@@ -70,12 +77,9 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
         writers: further output formats, by file suffix (Blender's).
     """
     from ..annotation import Timeline, check_timeline, read_timeline
-    from ..annotation.label_candidates import find_label_candidates, find_track_labels
+    from ..annotation.label_candidates import find_track_labels
     from ..files.tracking.tracking import read_track_csv
     from ..motion.track import clean_track
-    from ..synthesis.heading_table import read_heading_keys
-    from ..synthesis.pin_table import read_pins
-    from ..synthesis.plan import Plan
     from ..synthesis.search.request import USE_NEAREST
 
     started = time.perf_counter()
@@ -91,12 +95,7 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     check_timeline(timeline, library.labels, float(track.times[0]), float(track.times[-1]), str(annotations))
     above = _read_root(options, library, reporter) if options.keep_root else ()
     ready = time.perf_counter()
-    plan = Plan(
-        track=track, timeline=timeline, library=str(options.library),
-        pins=read_pins(options.pins) if options.pins else (),
-        heading_keys=read_heading_keys(options.headings) if options.headings else (),
-        **option_values(Plan, options, "synthesis", "player"),
-    )
+    plan = _build_plan(options, track, timeline)
     seconds = {"load": loaded - started, "library": ready - loaded}
     try:
         if window:
@@ -110,21 +109,50 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
         message = str(error.locate(annotations)).replace(USE_NEAREST, "add --nearest")
         raise NotInLibraryError(message, error.nearest, error.line, error.fixes) from None
     reporter.finish()
+    messages = [*(line for line in warnings if line not in library.notes),
+                *(f"{options.track}: {line}" for line in data.lines)]
+    for line in (*_describe_inputs(options, library, annotations),
+                 *(name_options(line, "synthesis") for line in messages)):
+        reporter.show_note(line)
+    if options.ball and ball is None:
+        reporter.show_note(_describe_missing_ball(options, library))
+    print(f"{options.out}: {frames} frames, {(frames - 1) / options.fps:.1f} s")
+
+
+def _build_plan(options, track: Track, timeline: Timeline) -> Plan:
+    """Build the plan of the command line."""
+    from ..synthesis.heading_table import read_heading_keys
+    from ..synthesis.pin_table import read_pins
+    from ..synthesis.plan import Plan
+
+    return Plan(
+        track=track, timeline=timeline, library=str(options.library),
+        pins=read_pins(options.pins) if options.pins else (),
+        heading_keys=read_heading_keys(options.headings) if options.headings else (),
+        **option_values(Plan, options, "synthesis", "player"),
+    )
+
+
+def _describe_inputs(options, library: Library, annotations: Path | None) -> list[str]:
+    """Describe where the labels come from, and that there are notes on the library."""
+    from ..annotation.label_candidates import find_label_candidates
+
+    lines = []
     if annotations and not options.annotations:
-        reporter.show_note(f"{options.track}: with the labels of {annotations}")
+        lines.append(f"{options.track}: with the labels of {annotations}")
     if candidates := find_label_candidates(options.track) if not annotations else ():
-        reporter.show_note(f"{options.track}: no labels; {candidates[0]} may have them, name it with --annotations")
+        lines.append(f"{options.track}: no labels; {candidates[0]} may have them, name it with --annotations")
     if library.notes:
         notes = f"{format_count(len(library.notes), 'note')} on how its recordings were read and repaired"
-        reporter.show_note(f"{options.library}: {notes}; the command 'library' prints all")
-    take_warnings = [line for line in warnings if line not in library.notes]
-    for line in (*take_warnings, *(f"{options.track}: {line}" for line in data.lines)):
-        reporter.show_note(name_options(line, "synthesis"))
-    if options.ball and ball is None:
-        hint = "" if options.recorded_ball else "; --recorded-ball takes that of the recordings"
-        hint = hint if any(clip.ball is not None for clip in library.clips) else ""
-        reporter.show_note(f"{options.track} has no ball, so {options.ball} is not written{hint}")
-    print(f"{options.out}: {frames} frames, {(frames - 1) / options.fps:.1f} s")
+        lines.append(f"{options.library}: {notes}; the command 'library' prints all")
+    return lines
+
+
+def _describe_missing_ball(options, library: Library) -> str:
+    """Describe why no ball is written, and whether the recordings have one."""
+    has_recorded = any(clip.ball is not None for clip in library.clips)
+    hint = "; --recorded-ball takes that of the recordings" if has_recorded and not options.recorded_ball else ""
+    return f"{options.track} has no ball, so {options.ball} is not written{hint}"
 
 
 def _read_root(options, library, reporter: ProgressReporter) -> tuple:
@@ -254,8 +282,6 @@ def run_evaluate(options, reporter: ProgressReporter, writers: Mapping[str, Writ
 
 def _evaluate_motion(options, reporter: ProgressReporter) -> None:
     """Report on a motion that was written before."""
-    import numpy as np
-
     if len(options.motion) > 1:
         raise InputError("evaluate", f"{len(options.motion)} motions", "one motion, or --against LIBRARY",
                          "evaluate them one after the other")
@@ -290,14 +316,8 @@ def _evaluate_motion(options, reporter: ProgressReporter) -> None:
         check_timeline(timeline, library.labels, start, float(track.times[-1]), str(options.annotations))
     with locate_errors(options.motion):
         report = evaluate_played(played, track=track, timeline=timeline, library=library)
-    notes = [*report["warnings"], *report["notes"], *_describe_fit(report, motion, track, options)]
-    if provenance is None and report["keys"]:
-        notes.append("the clips that played are unknown; name them with --provenance")
-    if ball is None and track is not None and np.isfinite(track.ball).any():
-        notes.append(f"{options.motion}: the ball as written is unknown, so the report has no contact gaps and no "
-                     "angle between head and ball; name it with --ball")
-    if _is_synthesis_report(options.report):
-        notes.append(f"{options.report}: replaces the report of synthesize, which knew more, such as the clips")
+    notes = [*report["warnings"], *report["notes"], *_describe_fit(report, motion, track, options),
+             *_describe_unknown(options, report, track)]
     write_report(options.report, report)
     if options.html:
         atomic_write(options.html, build_html_report(played, report, track=track, timeline=timeline, library=library,
@@ -323,6 +343,21 @@ def _describe_fit(report: dict, motion, track, options) -> list[str]:
     if away is not None and away > _OTHER_PLACE:
         lines.append(f"{options.motion} is {away:.1f} m from {options.track} on average; check that they belong "
                      "together")
+    return lines
+
+
+def _describe_unknown(options, report: dict, track: Track | None) -> list[str]:
+    """Describe what the report lacks because it was not named, and a better one that it replaces."""
+    import numpy as np
+
+    lines = []
+    if not options.provenance and report["keys"]:
+        lines.append("the clips that played are unknown; name them with --provenance")
+    if not options.ball and track is not None and np.isfinite(track.ball).any():
+        lines.append(f"{options.motion}: the ball as written is unknown, so the report has no contact gaps and no "
+                     "angle between head and ball; name it with --ball")
+    if _is_synthesis_report(options.report):
+        lines.append(f"{options.report}: replaces the report of synthesize, which knew more, such as the clips")
     return lines
 
 

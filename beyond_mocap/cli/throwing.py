@@ -17,6 +17,7 @@ from .outputs import ProgressReporter, Writer, add_subverbs, build_take, check_o
 if TYPE_CHECKING:
     from ..library.library import Library
     from ..synthesis.plan import Plan
+    from ..throws.throw_request import ThrowResult
 
 _FARTHEST = 1e5  # m
 
@@ -109,8 +110,6 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
-    import numpy as np
-
     from ..files.tables import write_ball, write_report
     from ..throws.throw import throw_at
 
@@ -118,13 +117,7 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     inputs = (options.model, options.skeleton, options.track, options.annotations)
     check_outputs(options.out, options.ball, options.report, reserved=inputs, library=options.library)
     write = choose_writer(options.out, writers)
-    for option, required, why in (("library", "track", "a player's track"),
-                                  ("track", "library", "a folder of recordings"),
-                                  ("cache", "library", "a folder of recordings"),
-                                  ("annotations", "track", "a player's track"),
-                                  ("track", "time", "the time of the ball's release")):  # fmt: skip
-        if getattr(options, option) and getattr(options, required) is None:
-            raise InputError(f"--{option}", f"set without --{required}", why, f"add --{required}")
+    _check_combination(options)
     model = _read_chosen_model(options)
     player = _Player.from_options(options, model, reporter) if options.library else None
     skeleton, form = _read_skeleton(options, player)
@@ -136,14 +129,7 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
         result, lines = player.insert_throw(result, reporter)
         notes += lines
     done = time.perf_counter()
-    if form is not None and options.out.suffix.lower() == ".bvh":
-        from ..files.bvh import bvh
-
-        notes += [f"{options.out}: {note}" for note in bvh.write_bvh(options.out, result.motion, form)]
-    else:
-        still = np.zeros((len(result.motion), 2))
-        write(build_take(result.motion, "throw", "throw", start_time=result.start_time, ball=result.path,
-                         warnings=result.warnings, correction=still, ik_miss=still), options.out)  # fmt: skip
+    notes += _write_motion(options.out, result, form, write)
     if options.ball:
         write_ball(options.ball, result.path)
     if options.report:
@@ -156,6 +142,31 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
         f"{options.out}: {len(result.motion)} frames, {verb} at {result.release_time:.3f} s with {result.speed:.1f} "
         f"m/s, {100 * result.impact_error:.1f} cm from the target, {100 * result.displacement:.1f} cm moved"
     )
+
+
+def _check_combination(options) -> None:
+    """Check that no option lacks another one that it needs."""
+    for option, required, why in (("library", "track", "a player's track"),
+                                  ("track", "library", "a folder of recordings"),
+                                  ("cache", "library", "a folder of recordings"),
+                                  ("annotations", "track", "a player's track"),
+                                  ("track", "time", "the time of the ball's release")):  # fmt: skip
+        if getattr(options, option) and getattr(options, required) is None:
+            raise InputError(f"--{option}", f"set without --{required}", why, f"add --{required}")
+
+
+def _write_motion(out: Path, result: ThrowResult, form, write: Writer) -> list[str]:
+    """Write the motion: in the form of its skeleton's file, or of the suffix's writer; returns notes."""
+    if form is not None and out.suffix.lower() == ".bvh":
+        from ..files.bvh import bvh
+
+        return [f"{out}: {note}" for note in bvh.write_bvh(out, result.motion, form)]
+    import numpy as np
+
+    still = np.zeros((len(result.motion), 2))
+    write(build_take(result.motion, "throw", "throw", start_time=result.start_time, ball=result.path,
+                     warnings=result.warnings, correction=still, ik_miss=still), out)  # fmt: skip
+    return []
 
 
 def _parse_point(text: str, count: int = 3) -> tuple[float, ...]:

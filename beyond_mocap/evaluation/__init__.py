@@ -10,13 +10,13 @@
                figures in `physics_figures`
 - `touch_view` the touches of a take, measured once; `contact_figures` whether they meet the ball, and can
 - `per_frame`  figures of every frame, footprints, key moments in space, for overlays and curves
-- `report`     the report as JSON, reports side by side as a table, and which targets are met
+- `report`     the report as JSON, flat, and which targets are met
 - `html` and `plots` the report as a page; `html_page` the parts of all reports' pages
 - `paired_tests` compare one method with another, subject by subject
 - `two_sample_test` whether classifiers can distinguish takes from recordings
 
     report = evaluate(take, track, library)
-    print(format_table({"path": report, "blocks": other}))
+    print(flatten_report(report)["root_error_m.mean"])
 
 Figures of a take alone are in `synthesis.quality`. Speed classes are 0-1, 1-2, 2-3, 3-4.5 m/s and above; an *own score*
 is the same figure on the uncut source clips, at the output's frame rate, over the frames that were used.

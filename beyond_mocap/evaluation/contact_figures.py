@@ -13,7 +13,7 @@ from ..synthesis.construct.ball_touch.part_reach import PELVIS_RANGE
 from ..synthesis.construct.ball_touch.touch_problem import BALL_NOISE, FILLED_NOISE
 from ..synthesis.construct.held_ball import HELD_DISTANCE
 from ..synthesis.construct.step_to_ball import compute_allowed_step
-from ..synthesis.quality.moments import KeyMomentResult, list_contact_labels, measure_contact
+from ..synthesis.quality.moments import KeyMomentResult, measure_contact
 from .view import View
 
 MET_GAP = 0.005
@@ -39,7 +39,7 @@ def measure_contacts(view: View) -> dict:
     Returns:
         The report's group.
     """
-    touching = [one for one in view.moments if find_striking_part(list_contact_labels(one))]
+    touching = [one for one in view.moments if find_striking_part(one.contact_labels)]
     rows = [(measure_contact(view.played, one)[1], find_reachable(view, one)) for one in touching]
     met = [gap <= MET_GAP for gap, _ in rows if math.isfinite(gap)]
     reachable = [gap <= MET_GAP for gap, is_reachable in rows if math.isfinite(gap) and is_reachable]
@@ -62,7 +62,7 @@ def find_reachable(view: View, moment: KeyMomentResult) -> bool | None:
         Whether the ball lies within the part's reach from the tracked pelvis, on the ground and in height, or beside
         who throws or punts it; None without a part, a track or a ball.
     """
-    labels = list_contact_labels(moment)
+    labels = moment.contact_labels
     part = find_striking_part(labels)
     if part is None or view.track is None or not len(view.track.known_ball[0]):
         return None

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from ..annotation import LOCOMOTION_LABELS, Timeline, labels_per_frame
-from ..annotation.labels import list_labels
+from ..annotation.ball_contact import SENDING
 from ..annotation.vocabulary import DIRECTIONS, SIDES
 from ..appearance.arm_clearance import measure_arm_depth
 from ..appearance.trunk import build_trunk
@@ -45,7 +45,6 @@ ASIDE = np.radians(30.0)
 """Angle between the ball's bearing and the travel from which on the ball lies aside."""
 
 _PLAIN_LABELS = frozenset((*LOCOMOTION_LABELS, *DIRECTIONS, *SIDES))
-_STRIKES = frozenset(list_labels(ball="sends"))
 
 FRAMES_KEYS = {
     "off_travel_deg_median": "fast_frames", "off_travel_deg_p90": "fast_frames",
@@ -239,7 +238,7 @@ def find_jolts(view: View) -> np.ndarray:
     flags[movement.TRANSITION_TO_JERK :][: len(ratios)] = ratios > JOLT_RATIO
     reach = int(round(STRIKE_SECONDS * view.fps))
     for moment in view.moments:
-        if _STRIKES & {*moment.requested.words, *moment.words}:
+        if SENDING & {*moment.requested.words, *moment.words}:
             flags[max(moment.frame - reach, 0) : moment.frame + reach + 1] = False
     return flags
 

@@ -13,7 +13,7 @@ import numpy as np
 from ..annotation.ball_contact import build_surfaces
 from ..annotation.striking import find_nearest_point, trace_fastest_surface
 from ..synthesis.quality import movement
-from ..synthesis.quality.moments import KeyMomentResult, find_written_ball, list_contact_labels, measure_contact
+from ..synthesis.quality.moments import KeyMomentResult, find_written_ball, measure_contact
 from .view import View
 
 
@@ -154,7 +154,7 @@ def find_strikes(view: View) -> tuple[Strike, ...]:
 
 def _find_strike(view: View, moment: KeyMomentResult) -> Strike:
     """Find the nearest points of body and ball at one key moment."""
-    played, words = view.played, list_contact_labels(moment)
+    played, words = view.played, moment.contact_labels
     contact_time, gap = measure_contact(played, moment)
     surfaces = build_surfaces(played.motion.skeleton, words)
     if not np.isfinite(gap) or not surfaces:

@@ -1,5 +1,4 @@
-"""The report: every figure of a player's take as JSON, several reports side by side, and one as text beside its
-targets."""
+"""The report: every figure of a player's take as JSON, and as text beside its targets."""
 
 from __future__ import annotations
 
@@ -146,23 +145,6 @@ def round_values(value):
     return value
 
 
-def format_table(reports: Mapping[str, dict]) -> str:
-    """Format reports side by side as a Markdown table.
-
-    Args:
-        reports: name -> report.
-    Returns:
-        One column per report, one row per figure, in the reports' order. Nested figures are named with dots, key
-        moments are numbered from 1, texts (warnings) are counted.
-    """
-    columns = {name: flatten_report(report) for name, report in reports.items()}
-    rows = dict.fromkeys(figure for column in columns.values() for figure in column)
-    lines = ["| figure | " + " | ".join(columns) + " |", "|---|" + "---|" * len(columns)]
-    for row in rows:
-        lines.append(f"| {row} | " + " | ".join(format_cell(column.get(row)) for column in columns.values()) + " |")
-    return "\n".join(lines) + "\n"
-
-
 def check_depth(value, where: object) -> None:
     """Check that a value from JSON is not nested deeper than any report.
 
@@ -208,17 +190,6 @@ def _flatten(value, name: str) -> dict[str, Any]:
         pairs = [(f"{name} {i}", entry) for i, entry in enumerate(value, 1)]
         return {k: v for label, entry in pairs for k, v in _flatten(entry, label).items()}
     return {name: value}
-
-
-def format_cell(value) -> str:
-    """Format one figure for a Markdown table.
-
-    Args:
-        value: the figure.
-    Returns:
-        The text.
-    """
-    return _format_value(value, "-").replace("|", "\\|")
 
 
 class Row(NamedTuple):

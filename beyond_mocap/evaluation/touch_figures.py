@@ -15,7 +15,7 @@ from ..base.errors import TimedMessage
 from ..base.time_series import find_runs
 from ..library.clip import SYNTHETIC_FOLDER
 from ..motion import quaternion
-from ..synthesis.quality.moments import KeyMomentResult, list_contact_labels
+from ..synthesis.quality.moments import KeyMomentResult
 from ..synthesis.quality.unmet_constraints import format_stretches
 from ..synthesis.search.key_fit import SPEED_RATIO
 from . import touches
@@ -139,7 +139,7 @@ def fits_part(touch_view: TouchView, moment: KeyMomentResult) -> bool:
 
 def fits_side(touch_view: TouchView, moment: KeyMomentResult) -> bool:
     """Return whether the ball lies on the side of the foot that is shown, or little across the body's middle."""
-    words, view = list_contact_labels(moment), touch_view.view
+    words, view = moment.contact_labels, touch_view.view
     side = touches.find_side(words)
     if side is None or find_striking_part(words) != "foot":
         return True

@@ -7,13 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
-from ..annotation.ball_contact import find_striking_part, may_use_foot
+from ..annotation.ball_contact import CARRYING, SENDING, TAKING, find_striking_part, may_use_foot
 from ..annotation.body_solid import BodySolid
 from ..annotation.body_surfaces import BodySurface, build_body_surfaces
-from ..annotation.labels import list_labels
 from ..annotation.striking import build_part_surfaces, measure_smallest_gap
 from ..annotation.vocabulary import SIDES
-from ..synthesis.quality.moments import KeyMomentResult, list_contact_labels
+from ..synthesis.quality.moments import KeyMomentResult
 from . import touches
 from .view import View
 
@@ -22,8 +21,6 @@ _ASKED_SECONDS = 0.5  # s about a requested action of a foot in which a strike b
 _OWN_STRIKE_SECONDS = 0.25  # s about a reception in which a strike is that of its own foot
 _AFTER_SECONDS = (1.0 / 30.0, 0.1)  # s after a kick between which the ball's speed is measured
 _NEAR_BALL = 1.6  # m from pelvis to ball within which a body may reach it
-_TAKES_OR_SENDS = frozenset((*list_labels(ball="takes"), *list_labels(ball="sends")))
-_CARRIES = frozenset(list_labels(ball="carries"))
 
 
 class TouchView:
@@ -108,7 +105,7 @@ class TouchView:
 
     def find_foot(self, moment: KeyMomentResult) -> int | None:
         """Find which foot touches the ball: the one that labels name, else the one nearest to the ball."""
-        side = touches.find_side(list_contact_labels(moment))
+        side = touches.find_side(moment.contact_labels)
         ball = self.ball[moment.frame]
         if side is not None or not np.isfinite(ball).all():
             return side
@@ -146,4 +143,4 @@ class TouchView:
 
 def _carries_only(words) -> bool:
     """Return whether labels only say that the ball is carried, as in a dribble."""
-    return not _TAKES_OR_SENDS.intersection(words) and bool(_CARRIES.intersection(words))
+    return not (TAKING | SENDING).intersection(words) and bool(CARRYING.intersection(words))

@@ -16,8 +16,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..annotation.ball_contact import find_striking_part
-from ..annotation.labels import list_labels
+from ..annotation.ball_contact import SENDING, TAKING, find_striking_part
 from ..annotation.vocabulary import SIDES
 from ..base.time_series import find_runs, time_derivative
 from ..library.posture import LEG_LENGTH
@@ -40,7 +39,6 @@ _STEP_SECONDS = 2.0  # s before a kick in which its last three landings lie
 _LIFTED_SECONDS = 0.1  # s before a kick up to which its plant foot may have left the ground
 _STRIDE_LEAST = 0.05  # m of the stride before the last; shorter ones are steps on the spot
 
-_SENDS, _TAKES = frozenset(list_labels(ball="sends")), frozenset(list_labels(ball="takes"))
 _RECEPTIONS = frozenset(("receive", "trap"))  # a foot that blocks takes the ball too, but does not give with it
 _BODY_PARTS = ("thigh", "chest", "head")
 
@@ -125,13 +123,13 @@ def is_foot_reception(words: Iterable[str]) -> bool:
 def is_body_reception(words: Iterable[str]) -> bool:
     """Return whether labels ask for a ball that thigh, chest or head take."""
     words = set(words)
-    return bool(_TAKES & words) and find_striking_part(words) in _BODY_PARTS
+    return bool(TAKING & words) and find_striking_part(words) in _BODY_PARTS
 
 
 def is_kick(words: Iterable[str]) -> bool:
     """Return whether labels ask for a ball that a foot sends."""
     words = set(words)
-    return bool(_SENDS & words) and find_striking_part(words) == "foot"
+    return bool(SENDING & words) and find_striking_part(words) == "foot"
 
 
 def find_side(words: Iterable[str]) -> int | None:

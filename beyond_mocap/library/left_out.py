@@ -22,6 +22,9 @@ from .features import Frames
 from .library import Library
 from .posture import SPEED_EDGES
 
+MAX_LISTED = 12
+"""Stretches left out of locomotion that people read at once."""
+
 _JOINED, _SHORTEST = 0.4, 0.5  # seconds between stretches that are one; of the shortest stretch that is listed
 _FAR = 0.3  # of a direction's component or in leg lengths: an offset that has a name
 _found: weakref.WeakKeyDictionary[Library, tuple[LeftOut, ...]] = weakref.WeakKeyDictionary()
@@ -169,7 +172,7 @@ def measure_speed_classes(library: Library) -> tuple[SpeedClass, ...]:
     return tuple(out)
 
 
-def describe_left_out(library: Library, most: int) -> list[str]:
+def describe_left_out(library: Library, most: int = MAX_LISTED) -> list[str]:
     """Describe what is left out: a line with the totals, then the longest stretches, at most `most`; empty where all
     belongs.
     """

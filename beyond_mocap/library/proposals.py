@@ -29,6 +29,7 @@ from ..base.vectors import arctan2
 from ..motion import contacts, quaternion
 from ..motion.humanoid import Humanoid, compute_heading_from_positions, identify_joints, measure_leg_length
 from ..motion.motion import Motion, forward_kinematics
+from ..motion.supports import GRAVITY
 from ..motion.t_poses import find_t_poses
 from .label_sources import Proposal
 from .library import Library
@@ -241,7 +242,7 @@ def _propose_jumps(seen: _RecordingSignals, kicks: list[Proposal]) -> list[Propo
         key = start + int(np.argmax(hips[start:stop]))
         rise = float(hips[key] - 0.5 * (hips[start] + hips[stop - 1]))
         taken = any(abs(key - one.annotation.key) < seen.to_frames(0.5) for one in kicks)
-        if rise < _FALL_SHARE * 9.81 / 8.0 * ((stop - start) / fps) ** 2 or taken:
+        if rise < _FALL_SHARE * GRAVITY / 8.0 * ((stop - start) / fps) ** 2 or taken:
             continue
         head = _measure_nod(seen, key)
         words = ("header", "jump") if head > _NOD else ("jump",)

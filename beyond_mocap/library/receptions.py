@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..annotation.ball_contact import shows_foot_on_ball
+from ..annotation.ball_contact import TAKING, shows_foot_on_ball
 from ..annotation.labels import list_labels
 from ..annotation.vocabulary import SIDES
 from .features import FPS, Frames
@@ -24,7 +24,7 @@ _FASTEST, _AROUND_SECONDS = 2.5, 0.13  # largest m/s against the body, and secon
 _SPAN_SECONDS = 0.3  # of a cut-out before and after its key moment
 _RUNNING = 2.0  # m/s of a body that runs
 _MOST = 24  # cut-outs of a library; the foot is slowest in these
-_CARRIES, _TAKES = list_labels(ball="carries"), frozenset(list_labels(ball="takes"))
+_CARRIES = list_labels(ball="carries")
 
 
 def find_cut_receptions(clips: Sequence, frames: Frames, feet_in_contact: np.ndarray, keys: Sequence[Key]
@@ -40,7 +40,7 @@ def find_cut_receptions(clips: Sequence, frames: Frames, feet_in_contact: np.nda
         Their key moments, labelled as receptions with the foot, in order of clips; none where a recording is labelled
         with one.
     """
-    if any(_TAKES & key.labels and shows_foot_on_ball(key.labels) and not clips[key.clip].is_synthetic for key in keys):
+    if any(TAKING & key.labels and shows_foot_on_ball(key.labels) and not clips[key.clip].is_synthetic for key in keys):
         return ()
     columns = [frames.vocabulary.index(word) for word in _CARRIES if word in frames.vocabulary]
     dribbles = frames.words[:, columns].any(axis=1) & ~np.array([clip.is_synthetic for clip in clips])[frames.clip]

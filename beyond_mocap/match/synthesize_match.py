@@ -10,7 +10,8 @@ However a run ends, the same request resumes where it was, with the same bits.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,7 +32,7 @@ from ..motion.track.match_data import Match
 from ..synthesis.one_thread import limit_to_one_thread
 from .folder import check_folder, open_folder, read_state
 from .goalkeeping.positions import fill_keepers
-from .known_bodies import build_known_bodies, follow_bodies, read_tracked
+from .known_bodies import SeenBodies, build_known_bodies, follow_bodies, read_tracked
 from .labels import MatchLabels, label_match
 from .match_ball import apply_led_ball, build_ball_plan, sample_ball
 from .pieces import stages
@@ -42,6 +43,7 @@ from .pieces.preparation import Preparation
 from .pieces.tasks import LibrarySource, set_library
 from .play import build_plays, find_kept_lines
 from .player_plans import (
+    PlayerPlans,
     build_player_plans,
     check_label_folder,
     list_overruled_labels,
@@ -50,9 +52,9 @@ from .player_plans import (
 )
 from .report.pictures import build_thumbnail_renderer
 from .request import MatchRequest, build_identity
-from .roles import build_roles, list_absent_players, resolve_span, separate_roles
+from .roles import Role, build_roles, list_absent_players, resolve_span, separate_roles
 from .seen_touches import name_seen_touches
-from .state import build_player_row, build_state, read_clocks
+from .state import MatchState, build_player_row, build_state, read_clocks
 
 BALL_MARGIN = 5.0
 """s before and after the span in which the ball is solved too."""
@@ -141,7 +143,7 @@ def synthesize_match(
                          report=report, cancelled=cancelled)
         try:
             with limit_to_one_thread():
-                _run_stages(job, (match, feed), events, span, report)
+                _run_stages(job, (match, feed), events, span)
         except BeyondMocapError as error:
             if state.players:  # otherwise no work has started
                 state.update_report(status="cancelled" if isinstance(error, UserCancelledError) else "failed",
@@ -166,62 +168,96 @@ def _build_library(request: MatchRequest, report: Progress, cancelled) -> tuple[
     return library, source
 
 
-def _run_stages(
-    job: Job, tracked: tuple[Match, JointFeed | None], events: MatchEvents | None, span: tuple[float, float],
-    report: Progress,
-) -> None:
+def _run_stages(job: Job, tracked: tuple[Match, JointFeed | None], events: MatchEvents | None,
+                span: tuple[float, float]) -> None:
     """Run all stages after reading."""
     state, begin, preparation = job.state, read_clocks(), Preparation(job, span)
-    match, feed = tracked
+    with _record_stage(state, "ball"):
+        people = _find_people(job, *tracked, span)
+    with _record_stage(state, "words"):
+        parts = _plan_players(job, people, events, span, preparation)
+    state.write_state()
+    with _record_stage(state, "search"):
+        edits = stages.search_players(_scale_job(job, "search"), parts)
+    with _record_stage(state, "crowd"):
+        motion = ConstructedMotion(_scale_job(job, "motion"), edits)
+        crowd = stages.resolve_player_collisions(_scale_job(job, "crowd"), motion, span) if edits else {}
+        ball = _write_match_ball(job, people.match, people.solved, span, crowd)
+    with _record_stage(state, "figures"):
+        stages.finish_players(_scale_job(job, "figures"), parts, motion, crowd, ball)
+    state.record_stage("total", begin)
+    _finish_match(job, crowd, motion)
+
+
+@contextmanager
+def _record_stage(state: MatchState, stage: str) -> Iterator[None]:
+    """Record how long a stage takes, once it is finished."""
+    clock = read_clocks()
+    yield
+    state.record_stage(stage, clock)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _People:
+    """Who is where in a match, and where the ball is.
+
+    Attributes:
+        match: the tracks, those of players who were seen as bodies among them.
+        bodies: bodies that were seen.
+        roles: the players' roles, goalkeepers filled in.
+        solved: the solved ball, None where it is not solved.
+        sides: index of a touch -> side that was seen.
+    """
+
+    match: Match
+    bodies: SeenBodies
+    roles: tuple[Role, ...]
+    solved: SolvedBall | None
+    sides: Mapping[int, str]
+
+
+def _find_people(job: Job, match: Match, feed: JointFeed | None, span: tuple[float, float]) -> _People:
+    """Find who is where and solve the ball; notes go to the job's report."""
+    notes = job.state.report["notes"]
     if job.request.pitch not in (None, (match.length, match.width)):
-        state.report["notes"].append(f"the tracking data has its own pitch, {match.length:g} x {match.width:g} m: the "
-                                     "requested size is not used")
-    state.report["notes"] += _check_sport(match, job.request.sport)
+        notes.append(f"the tracking data has its own pitch, {match.length:g} x {match.width:g} m: the requested size "
+                     "is not used")
+    notes += _check_sport(match, job.request.sport)
     bodies = build_known_bodies(feed, match, job.request, job.library, span)
-    state.report["notes"] += bodies.notes
+    notes += bodies.notes
     match = follow_bodies(match, bodies)
     present, filled = fill_keepers(match, find_kept_lines(match)) if job.request.sport == FOOTBALL else (match, ())
-    state.report["notes"] += filled
+    notes += filled
     roles = build_roles(present, job.request, span)
-    state.report["notes"] += list_absent_players(job.request, roles, span)
-    solved = _solve_ball(job, match, span, _scale_progress(report, "ball"))
+    notes += list_absent_players(job.request, roles, span)
+    solved = _solve_ball(job, match, span, _scale_progress(job.report, "ball"))
     solved, sides = (solved, {}) if solved is None else name_seen_touches(solved, bodies, job.library)
-    state.record_stage("ball", begin)
-    clock = read_clocks()
-    words = _label_players(job, match, events, solved, sides)
+    return _People(match=match, bodies=bodies, roles=roles, solved=solved, sides=sides)
+
+
+def _plan_players(job: Job, people: _People, events: MatchEvents | None, span: tuple[float, float],
+                  preparation: Preparation) -> list[PlayerPlans]:
+    """Label all players, separate their tracks and build their plans; the state gets a row for each."""
+    state, match = job.state, people.match
+    words = _label_players(job, match, events, people.solved, people.sides)
     inside = (match.times >= span[0] - 1e-6) & (match.times <= span[1] + 1e-6)
     touches = {player: [one.time for one in moments if one.end is None and not one.misses_ball]
                for player, moments in words.players.items()}
-    roles, state.report["spacing"] = separate_roles(roles, match.times[inside], touches,
-                                                      preparation.solve_episodes)
+    roles, state.report["spacing"] = separate_roles(people.roles, match.times[inside], touches,
+                                                    preparation.solve_episodes)
     names = build_file_names(player.id for player in match.players)
-    parts = build_player_plans(roles, names, words, solved=solved, request=job.request, folder=job.folder,
-                               library=job.library, plays=build_plays(match), bodies=bodies,
+    parts = build_player_plans(roles, names, words, solved=people.solved, request=job.request, folder=job.folder,
+                               library=job.library, plays=build_plays(match), bodies=people.bodies,
                                plan_headings=preparation.plan_headings)
     rows = job.folder.previous_state.get("players", ())
     finished = {row["id"]: row["finished"] for row in rows if isinstance(row.get("finished"), str)}
     state.players = {part.role.player.id: build_player_row(part, finished.get(part.role.player.id)) for part in parts}
-    for player, one in bodies.players.items():
+    for player, one in people.bodies.players.items():
         if player in state.players:
             state.players[player]["bodies"] = one.rows
     state.report["notes"] += list_unknown_texts(job.request.annotations, names.values())
     state.report["notes"] += list_unused_labels(parts, job.request, names) + list_overruled_labels(parts)
-    state.record_stage("words", clock)
-    state.write_state()
-    clock = read_clocks()
-    edits = stages.search_players(replace(job, report=_scale_progress(report, "search")), parts)
-    state.record_stage("search", clock)
-    clock = read_clocks()
-    motion = ConstructedMotion(replace(job, report=_scale_progress(report, "motion")), edits)
-    crowd = stages.resolve_player_collisions(replace(job, report=_scale_progress(report, "crowd")), motion,
-                                             span) if edits else {}
-    ball = _write_match_ball(job, match, solved, span, crowd)
-    state.record_stage("crowd", clock)
-    clock = read_clocks()
-    stages.finish_players(replace(job, report=_scale_progress(report, "figures")), parts, motion, crowd, ball)
-    state.record_stage("figures", clock)
-    state.record_stage("total", begin)
-    _finish_match(job, crowd, motion)
+    return parts
 
 
 def _check_sport(match: Match, sport: str) -> list[str]:
@@ -329,3 +365,8 @@ def _scale_progress(report: Progress, stage: str) -> Progress:
     names = list(_STAGE_ENDS)
     low, high = _STAGE_ENDS[names[names.index(stage) - 1]] if stage != names[0] else 0.0, _STAGE_ENDS[stage]
     return lambda fraction, text: report(low + (high - low) * fraction, text)
+
+
+def _scale_job(job: Job, stage: str) -> Job:
+    """Return the job with the progress of one stage scaled to its part of the whole."""
+    return replace(job, report=_scale_progress(job.report, stage))

@@ -15,15 +15,15 @@ from typing import Any
 import numpy as np
 
 from ..annotation.ball_contact import find_striking_part, may_use_several_parts
-from ..annotation.striking import BODY_PARTS
+from ..annotation.striking import BODY_PARTS, SIDED_PARTS
 from ..ball.contact import Tool
 from ..base.digest import hex_digest
 from ..library.clip import Clip
 from ..library.library import Library
 from . import analysis_cache as kept
 from .hits import HitMotion, build_hit_at, detect_hits
+from .pass_scene import KINDS
 
-KINDS = ("toss", "pass", "attack")
 # m/s of the part between toss and pass, and between pass and attack (section 5 divides them by highest speed)
 _KIND_SPEEDS = {"foot": (4.5, 7.5), "hand": (4.0, 7.0), "head": (2.0, 3.5), "chest": (1.0, 2.0), "tool": (8.0, 13.0)}
 _LEAST_TOUCH_SPEED = 0.3  # m/s: least speed of a part whose labels say that it touches the ball
@@ -185,7 +185,7 @@ def _find_hits_of_clip(index: int, clip: Clip, part: str, tool: Tool | None) -> 
     """Find the hit motions of one clip, with labelled keys where there are labels, in order of time."""
     if len(clip.recording) < 3:
         return []
-    sides = ("left", "right") if part in ("foot", "hand", "tool") else ("",)
+    sides = ("left", "right") if part in SIDED_PARTS else ("",)
     hits = [hit for side in sides for hit in detect_hits(clip.recording, part, side, tool=tool).motions]
     found = [_apply_label(index, clip, hit) for hit in hits]
     found += [LibraryHit(index, hit, True) for hit in _build_labelled_hits(clip, part, sides, hits, tool)]

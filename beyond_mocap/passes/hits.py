@@ -20,13 +20,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..annotation.striking import SIDED_PARTS
 from ..ball.contact import Tool
 from ..base.errors import InputError
 from ..motion import quaternion
 from ..motion.motion import Motion
 from .part_trajectory import PartMeasures, PartTrajectory, PlayerBody, measure_part
 
-_SIDED = ("foot", "hand", "tool")
 _APART = 0.25  # s: least distance of two fast frames; the part's return after a hit is closer
 _SLOW = 0.4  # of the highest speed in a hit motion: the part is at most so fast at its ends
 _SLOWED = 0.9  # of the highest speed: a part that is slower again has struck
@@ -146,7 +146,7 @@ def detect_hits(motion: Motion, part: str = "foot", side: str = "right", thresho
     _check_input(motion, threshold)
     measured = measured or measure_part(motion, part, side, joint=joint, tool=tool)
     body, trajectory, other = measured.body, measured.trajectory, measured.other
-    side = side if part in _SIDED else ""
+    side = side if part in SIDED_PARTS else ""
     peaks = _find_peaks(trajectory.height)
     height_threshold = _find_threshold(trajectory.height, peaks, part) if threshold is None else float(threshold)
     highs = [frame for frame in peaks if trajectory.height[frame] > height_threshold]
@@ -195,7 +195,7 @@ def detect_hit_under_way(motion: Motion, part: str = "foot", side: str = "right"
         return None
     if threshold is None and not _is_hit((first, now), part, trajectory, body, other):
         return None
-    hit = _build_hit_motion(part, side if part in _SIDED else "", (first, now), trajectory, body, key=key)
+    hit = _build_hit_motion(part, side if part in SIDED_PARTS else "", (first, now), trajectory, body, key=key)
     if hit.velocity[0] < 0.0:  # it draws back for the strike
         return None
     coming = np.arange(4) >= (1 if hit.high > key else 3)
@@ -216,7 +216,7 @@ def find_strongest_hit(motion: Motion, part: str, side: str = "", tool: Tool | N
     Raises:
         InputError: as `detect_hits`.
     """
-    sides = (side,) if side else (("left", "right") if part in _SIDED else ("",))
+    sides = (side,) if side else (("left", "right") if part in SIDED_PARTS else ("",))
     hits = [hit for one in sides if (hit := detect_hits(motion, part, one, tool=tool).strongest)]
     return max(hits, key=lambda hit: hit.max_speed, default=None)
 
@@ -244,7 +244,7 @@ def build_hit_at(motion: Motion, frame: int, span: tuple[int, int], part: str = 
     first = int(np.clip(span[0], 0, len(motion) - 3))
     last = int(np.clip(span[1], first + 2, len(motion) - 1))
     key = int(np.clip(frame, first + 1, last - 1))
-    side = side if part in _SIDED else ""
+    side = side if part in SIDED_PARTS else ""
     return _build_hit_motion(part, side, (first, last), measured.trajectory, measured.body, key=key)
 
 

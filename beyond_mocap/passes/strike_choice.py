@@ -15,6 +15,7 @@ import numpy as np
 
 from ..annotation.ball_contact import find_striking_part
 from ..annotation.labels import list_labels
+from ..annotation.striking import SIDED_PARTS
 from ..ball.contact import (
     StrikeSurface,
     Tool,
@@ -36,7 +37,6 @@ RECEIVE_LABELS = frozenset(list_labels(ball="takes"))
 OTHER_ACTS = frozenset(list_labels(ball="never"))
 _NAMED, _UNNAMED, _OTHER = range(3)  # labels name this part, no part, or another part or act
 _HAND_VOLLEY = {"hand", "volley"}  # a volleyball player's volley, not a footballer's
-_SIDED = ("foot", "hand", "tool")
 
 MOST_FRAMES = 7
 """Most moments that are tried in one ball stretch, spread evenly."""
@@ -70,7 +70,7 @@ class PartStrikes:
         Raises:
             InputError: if the skeleton lacks the part.
         """
-        find_striking_surface(library.skeleton, part, "right" if part in _SIDED else "", tool)
+        find_striking_surface(library.skeleton, part, "right" if part in SIDED_PARTS else "", tool)
         measured = HitLibrary.from_library(library, part, tool)
         return cls(part, measured, tuple(_collect_labels(library, one.clip, one.hit.key) for one in measured.hits))
 

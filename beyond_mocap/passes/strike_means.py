@@ -6,6 +6,7 @@ from itertools import zip_longest
 
 import numpy as np
 
+from ..annotation.striking import SIDED_PARTS
 from ..ball.contact import Tool
 from ..base.errors import InputError, NotInLibraryError
 from ..library.library import Library
@@ -17,7 +18,6 @@ from .strike_choice import PartStrikes, StrikeMoments, collect_strike_moments
 
 MOST_HITS = 24
 """Most hit motions that are tried for one strike; those that suit its kind best come first."""
-_SIDED = ("foot", "hand", "tool")
 
 
 class StrikeMeans:
@@ -101,7 +101,7 @@ class StrikeMeans:
 
     def _select_hits(self, part: str, side: str, tool: Tool | None, kind: str, example) -> tuple[LibraryHit, ...]:
         """Select the hit motions for a kind of pass, or the one that is most similar to an example."""
-        own, side_wanted = self._find_strikes(part, tool), side if part in _SIDED else ""
+        own, side_wanted = self._find_strikes(part, tool), side if part in SIDED_PARTS else ""
         if example is None:
             hits = own.select_by_kind(kind, side_wanted)[:MOST_HITS]
         else:

@@ -34,18 +34,16 @@ HOLD_FADE = 0.7
 _FAR_MISS = np.radians([45.0, 135.0])  # between which a given heading counts as one that the body cannot reach in time
 
 
-def plan_track(track: SampledTrack, keys: Sequence[HeadingKey] = (), rests: bool = True) -> SampledTrack:
+def plan_track(track: SampledTrack) -> SampledTrack:
     """Plan where the body of a track rests and where it faces.
 
     Args:
         track: the player's track with the ball, T frames.
-        keys: headings that are given.
-        rests: whether the body may rest where the track hardly moves; False: it is on the track.
     Returns:
         The same with the places and headings of the body.
     """
-    relaxed = rest_track(track, rests)
-    return replace(relaxed, heading=plan_heading(relaxed, keys))
+    relaxed = rest_track(track)
+    return replace(relaxed, heading=plan_heading(relaxed))
 
 
 def rest_track(track: SampledTrack, rests: bool = True) -> SampledTrack:

@@ -17,7 +17,14 @@ from operator import attrgetter
 import numpy as np
 
 from ..annotation import KeyMoment, Span, Timeline
-from ..annotation.ball_contact import build_surfaces, find_contact_window, find_striking_part, measure_contact_gap
+from ..annotation.ball_contact import (
+    SENDING,
+    TAKING,
+    build_surfaces,
+    find_contact_window,
+    find_striking_part,
+    measure_contact_gap,
+)
 from ..annotation.labels import list_labels
 from ..annotation.striking import build_part_surfaces, measure_ball_gap
 from ..ball.tracked.carried import find_carried_stretches
@@ -52,7 +59,6 @@ _MAX_SAMPLE_GAP = 0.1  # s from the nearest measured sample beyond which the bal
 _CARRIED_MARGIN = 0.15  # s from the ends of such a stretch from which on its course shows no touches, only steering
 _LISTED_TIMES = 6  # key moments that a line lists
 _STEP = 0.004  # s between the points of a trajectory
-_SENDING, _TAKING = frozenset(list_labels(ball="sends")), frozenset(list_labels(ball="takes"))
 _CARRYING, _HOLDING = (frozenset(list_labels(ball=what)) for what in ("carries", "holds"))
 _SENDING_KINDS = {kind.name for kind in TOUCH_KINDS if kind.ball in ("sends", "carries")}
 _TAKING_KINDS = {kind.name for kind in TOUCH_KINDS if kind.ball == "takes"}
@@ -203,7 +209,7 @@ def _compute_mismatch(key: KeyMoment, touch: PlayerTouch) -> float:
     part, words, off = find_striking_part(key.words), set(key.words), abs(touch.time - key.time)
     if part is None or key.misses_ball or off > MAX_TOUCH_OFFSET:
         return np.inf
-    kinds = _SENDING_KINDS if _SENDING & words else _TAKING_KINDS if _TAKING & words else {touch.kind}
+    kinds = _SENDING_KINDS if SENDING & words else _TAKING_KINDS if TAKING & words else {touch.kind}
     unlike = _UNKNOWN_PLAYER_COST * (touch.is_own is None) + _OTHER_KIND_COST * (touch.kind not in kinds)
     unlike += _OTHER_PART_COST * (touch.part not in ("", part))
     return off + unlike

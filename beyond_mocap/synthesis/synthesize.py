@@ -146,7 +146,7 @@ def _synthesize_plan(library: Library, requested: Plan, report: Progress, **opti
     return finish_take(take, plan, recordings, request, hurried_from=found.hurried_from, notes=found.notes)
 
 
-def construct_take(library: Library, plan: ResolvedPlan, edit: EditList, progress: Progress | None = None) -> Take:
+def construct_take(library: Library, plan: ResolvedPlan, edit: EditList) -> Take:
     """Construct the take of method "path" that shows an edit list: all that `synthesize` does after its search.
 
     Unmet constraints are not in its warnings: it may be a part of a longer take, for which `evaluation.report.evaluate`
@@ -156,12 +156,10 @@ def construct_take(library: Library, plan: ResolvedPlan, edit: EditList, progres
         library: the clips, with synthetic ones (`Library.with_synthetic_clips`) where the edit list shows them.
         plan: the resolved plan.
         edit: at the library's rate, from the track's first time on.
-        progress: called as progress(fraction, text).
     """
     with limit_to_one_thread():
         request = build_request(library, plan, has_costs=False)
-        take, seconds = _construct_motion(library, plan, request, SearchResult(edit),
-                                          progress or (lambda fraction, text: None))
+        take, seconds = _construct_motion(library, plan, request, SearchResult(edit), lambda fraction, text: None)
         return finish_take(replace(take, seconds=seconds), plan, library, request, report_unmet=False)
 
 

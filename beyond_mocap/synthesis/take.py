@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..annotation import KeyMoment, Timeline
-from ..annotation.ball_contact import choose_contact_labels
+from ..annotation.ball_contact import list_contact_labels
 from ..motion.motion import Motion
 from ..motion.track.ball_path import BallPath
 from .heading_path import HeadingPath
@@ -40,8 +40,8 @@ class KeyResult:
 
     @property
     def contact_labels(self) -> tuple[str, ...]:
-        """Labels that say which part meets the ball (`ball_contact.choose_contact_labels`); none if it misses it."""
-        return () if self.requested.misses_ball else choose_contact_labels(self.words, self.requested.words)
+        """Labels that define the part that meets the ball (`ball_contact.list_contact_labels`)."""
+        return list_contact_labels(self.words, self.requested)
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from ..motion.retargeting.adult import build_adult_skeleton
 from ..motion.retargeting.neutral import NeutralStance, build_neutral_stance
 from ..motion.retargeting.posture import Posture, to_motion
 from ..motion.skeleton import Skeleton
+from ..motion.supports import GRAVITY
 from . import gait_tables as tables
 from .footsteps import Footsteps
 from .gait_legs import measure_push_off, plant_feet
@@ -150,7 +151,7 @@ def _limit_stances(
 def _compute_lean_shift(gait_plan: GaitPlan, neutral: NeutralStance, at: np.ndarray) -> np.ndarray:
     """Compute how far the feet stay behind the hips (K, 2) m while the body leans into an acceleration."""
     height = 0.8 * (neutral.leg + neutral.ankle_height)
-    shift = height * interpolate_columns(at, gait_plan.times, gait_plan.acceleration) / tables.GRAVITY
+    shift = height * interpolate_columns(at, gait_plan.times, gait_plan.acceleration) / GRAVITY
     size = np.linalg.norm(shift, axis=-1, keepdims=True)
     limit = 0.30 * neutral.leg
     return shift * np.where(size > 1e-9, limit * np.tanh(size / limit) / np.maximum(size, 1e-9), 1.0)

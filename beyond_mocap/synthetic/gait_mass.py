@@ -19,6 +19,7 @@ from ..motion.mass import compute_centre_of_mass
 from ..motion.motion import forward_kinematics
 from ..motion.retargeting.neutral import NeutralStance
 from ..motion.retargeting.posture import Posture, to_motion
+from ..motion.supports import GRAVITY
 from . import gait_tables as tables
 from .footsteps import Footsteps
 from .gait_legs import Legs
@@ -174,7 +175,7 @@ def _compute_flight_speed(plan: GaitPlan, flights: Flights, base: np.ndarray) ->
 
 def _fly(place: np.ndarray, speed: np.ndarray, seconds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Compute place (K, 3) m and velocity (K, 3) m/s of a body that has flown for `seconds` (K,)."""
-    fall = np.array([0.0, 0.0, -tables.GRAVITY])
+    fall = np.array([0.0, 0.0, -GRAVITY])
     seconds = seconds[:, None]
     return place + speed * seconds + 0.5 * fall * seconds**2, speed + fall * seconds
 

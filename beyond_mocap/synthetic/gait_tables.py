@@ -27,12 +27,12 @@ import numpy as np
 
 from ..base.easing import quintic_step
 from ..motion.retargeting import adult
+from ..motion.supports import GRAVITY
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline, PchipInterpolator
 
 LEG = adult.ADULT_LEG
-GRAVITY = 9.81  # m/s^2
 FASTEST = 9.5  # m/s, the tables' last speed
 # m/s between which walking changes into running (N: spontaneous change at 1.9 to 2.3 m/s)
 _WALK_TO_RUN = (1.95, 2.35)

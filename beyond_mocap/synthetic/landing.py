@@ -21,7 +21,7 @@ from ..motion.motion import Motion, compute_pose, concatenate_motions, resample,
 from ..motion.retargeting.neutral import build_neutral_stance
 from ..motion.skeleton import Skeleton
 from ..motion.spring import Offset
-from .gait_tables import GRAVITY
+from ..motion.supports import GRAVITY
 from .lying import build_lying_pose, compute_lowest_root, raise_arms, smooth_above
 
 FLIGHT_HEIGHT = 0.25

@@ -13,6 +13,7 @@ from ..motion.retargeting.adult import build_adult_skeleton
 from ..motion.retargeting.neutral import NeutralStance, build_neutral_stance
 from ..motion.retargeting.posture import to_motion
 from ..motion.skeleton import Skeleton
+from ..motion.supports import GRAVITY
 from . import gait_tables as tables
 from .footsteps import Footsteps
 from .gait import build_posture, plan_footsteps
@@ -72,7 +73,7 @@ def build_header(
     times = gait_plan.times - key
     air, longer = float(_FLIGHT * np.sqrt(scale)), 0.0
     if rise is not None:
-        air = float(np.sqrt(2.0 * max(rise - _SOFT_TOES * scale, 0.02) / tables.GRAVITY))
+        air = float(np.sqrt(2.0 * max(rise - _SOFT_TOES * scale, 0.02) / GRAVITY))
         longer = air - _FLIGHT
     table_times = _adapt_times(times, air, longer)
     trunk, arms = (np.radians(interpolate_rows(_HEADER[name], table_times)) for name in ("trunk", "arms"))
@@ -114,8 +115,8 @@ def _compute_jump(times, air: float, standing: np.ndarray, *, neutral: NeutralSt
 
     scale = neutral.leg / tables.LEG
     take_off = np.mean(standing) + (_TOES if longer == 0.0 else _SOFT_TOES) * scale
-    speed = tables.GRAVITY * air
-    flight = take_off + speed * (times + air) - 0.5 * tables.GRAVITY * (times + air) ** 2
+    speed = GRAVITY * air
+    flight = take_off + speed * (times + air) - 0.5 * GRAVITY * (times + air) ** 2
     crouch, absorb = (np.array(_HEADER[name]) + [shift, 0.0] for name, shift in (("crouch", -longer),
                                                                                   ("absorb", longer)))
     base = float(np.mean(standing))

@@ -28,6 +28,7 @@ from ..motion.retargeting.adult import build_adult_skeleton
 from ..motion.retargeting.neutral import NeutralStance, build_neutral_stance
 from ..motion.retargeting.posture import Posture, to_motion
 from ..motion.skeleton import Skeleton
+from ..motion.supports import GRAVITY
 from . import gait_tables as tables
 from .footsteps import lift_foot
 from .gestures import RIGHT, build_plan_parts, choose_style
@@ -242,10 +243,10 @@ def _compute_elevation(to_target: np.ndarray, speed: float) -> float:
         InputError: if there is none.
     """
     level, up = float(np.hypot(to_target[0], to_target[1])), float(to_target[2])
-    inside = speed**4 - tables.GRAVITY * (tables.GRAVITY * level**2 + 2.0 * up * speed**2)
+    inside = speed**4 - GRAVITY * (GRAVITY * level**2 + 2.0 * up * speed**2)
     if level < 1e-6 or inside < 0.0:
         raise InputError("throw", "a target out of reach", f"one that {speed:g} m/s reach", "throw faster or nearer")
-    return float(np.arctan2(speed**2 - np.sqrt(inside), tables.GRAVITY * level))
+    return float(np.arctan2(speed**2 - np.sqrt(inside), GRAVITY * level))
 
 
 def _build_posture(style: ThrowStyle, neutral: NeutralStance) -> Posture:

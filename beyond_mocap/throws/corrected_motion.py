@@ -27,11 +27,6 @@ class Freedom:
     release: float = 0.02
     start_position: bool = True
 
-    @classmethod
-    def build_anchored(cls) -> Freedom:
-        """Return the freedom of a motion that is joined to others: it keeps its position, heading and frames."""
-        return cls(0.0, 0.0, 0.02, False)
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CorrectedMotion:

@@ -31,7 +31,7 @@ from ..motion.motion import Motion, place_motion
 from ..motion.retargeting.adult import ADULT_LEG, build_adult_skeleton
 from ..motion.retargeting.neutral import NeutralStance, build_neutral_stance
 from ..motion.skeleton import Skeleton
-from ..synthetic.gait_tables import GRAVITY
+from ..motion.supports import GRAVITY
 from ..synthetic.gestures import choose_style
 from ..synthetic.kicks import BEFORE, KICKS, KickStyle, build_kick, compute_contacts
 from ..synthetic.performers import Performer, build_kicker, build_performer_throw, build_thrower, vary_kick

@@ -10,7 +10,7 @@ from bpy.props import BoolProperty, IntProperty, StringProperty
 from ...beyond_mocap.base.errors import InputError, format_count
 from ...beyond_mocap.base.fixes import Fix
 from ...scene.core import preferences, session, window
-from ...scene.core.settings import to_absolute_path, to_setting_path
+from ...scene.core.settings import require_library_folder, to_absolute_path, to_setting_path
 from ...scene.library import clips, foreign, recordings
 from ..operator_base import BackgroundOperator, BaseOperator
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from ...beyond_mocap.library.library import Library
 
 
-MAX_LEFT_OUT = 12  # stretches left out of locomotion that the panel lists
 
 
 class FolderOperator(BackgroundOperator):
@@ -91,10 +90,7 @@ glTF and USD clips are converted first, and the result is cached"""
 
     def order(self, context):
         settings = context.scene.beyond_mocap
-        if not settings.library_folder:
-            raise InputError("library", "no folder chosen", "a folder of BVH clips", "choose one in step 1",
-                             fixes=(Fix("choose_library"),))
-        folder = to_absolute_path(settings.library_folder)
+        folder = require_library_folder(settings)
         unit = settings.library_unit or None
         queue = self.queue or self.create_queue(context)
         while queue.remaining:  # called from a script; in a window `modal` has converted them one by one
@@ -212,7 +208,7 @@ def describe_gaps(library: "Library") -> str:
     """
     from ...beyond_mocap.library.left_out import describe_left_out
 
-    missing, left_out = list(library.coverage.lines.values()), describe_left_out(library, MAX_LEFT_OUT)
+    missing, left_out = list(library.coverage.lines.values()), describe_left_out(library)
     labels = [*library.proposal_notes, *library.unlabelled_notes]
     parts = ["Proposed labels"] if library.proposal_notes else []
     parts += ["Clips without labels"] if library.unlabelled_notes else []

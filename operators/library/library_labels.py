@@ -7,9 +7,8 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ...beyond_mocap.base.errors import BeyondMocapError, InputError, format_count
-from ...beyond_mocap.base.fixes import Fix
 from ...scene.core import preferences, sample, session
-from ...scene.core.settings import to_absolute_path
+from ...scene.core.settings import require_library_folder, to_absolute_path
 from ...scene.core.window import clear_status, show_status
 from ...scene.library import clips, recordings
 from ...scene.timeline import label_tracks as lanes
@@ -324,10 +323,7 @@ others; the result is a file that works with any library"""
     def order(self, context):
         """Collect folder, unit and target file."""
         settings = context.scene.beyond_mocap
-        if not settings.library_folder:
-            raise InputError("library", "no folder chosen", "a folder of BVH clips", "choose one in step 1",
-                             fixes=(Fix("choose_library"),))
-        folder = to_absolute_path(settings.library_folder)
+        folder = require_library_folder(settings)
         return LearnOrder(folder, settings.library_unit or None, preferences.find_cache_folder(folder),
                           to_absolute_path(self.out))
 

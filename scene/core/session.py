@@ -55,6 +55,21 @@ def find_library(folder: str, unit: float | None) -> "Library | None":
     return _libraries.get((str(Path(folder).resolve()), unit))
 
 
+def open_library(order, progress, cancelled) -> "Library":
+    """Return the library of an order; build it if it is not loaded. Does not use bpy.
+
+    Args:
+        order: with `library`, `folder`, `unit` and `build`, further arguments of `build_library`.
+        progress: receives a share of 0 .. 1 and a text.
+        cancelled: returns True to stop.
+    """
+    from ...beyond_mocap.library.build import build_library
+
+    if order.library is not None:
+        return order.library
+    return build_library(order.folder, unit=order.unit, **order.build, progress=progress, cancelled=cancelled)
+
+
 def store_take(plan: "Plan", take: "Take", report: dict | None = None) -> str:
     """Store a take with its plan and its report; return its name."""
     name = f"take-{_session}-{next(_numbers)}"

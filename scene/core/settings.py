@@ -15,6 +15,8 @@ from bpy.props import (
     StringProperty,
 )
 
+from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.base.settings import list_settings
 from ..characters import player_character
 from ..characters.settings import is_original
@@ -172,6 +174,14 @@ class BeyondMocapWork(bpy.types.PropertyGroup):
 def to_absolute_path(path: str) -> str:
     """Return a path from a setting as an absolute one; empty stays empty, and the sample is found where it is now."""
     return find_moved_path(bpy.path.abspath(path)) if path else ""
+
+
+def require_library_folder(settings: "BeyondMocapSettings") -> str:
+    """Return the absolute path of the library's folder; InputError where none is chosen."""
+    if not settings.library_folder:
+        raise InputError("library", "no folder chosen", "a folder of clips", "choose one in step 1",
+                         fixes=(Fix("choose_library"),))
+    return to_absolute_path(settings.library_folder)
 
 
 def to_setting_path(path: str) -> str:

@@ -32,30 +32,28 @@ LABEL_HEIGHT, RGBA, UNASSIGNED = 11, (1.0, 1.0, 1.0, 0.9), (1.0, 0.65, 0.1, 1.0)
 
 
 def create_cloud(
-    context: bpy.types.Context, trial: "MarkerTrial", name: str = "", start: float | None = None, collection=None
+    context: bpy.types.Context, trial: "MarkerTrial", start: float | None = None
 ) -> bpy.types.Object:
     """Create a cloud that plays a trial; the scene's end is extended.
 
     Args:
-        context: with the scene.
+        context: with the scene, and the collection for the cloud.
         trial: the trial.
-        name: of the cloud; "" uses the trial's.
         start: scene frame of the first sample; None for the scene's first.
-        collection: for the cloud; None for the active one.
     Returns:
         The cloud.
     Raises:
         InputError: if no marker is visible, or the collection belongs to another file.
     """
-    scene, units, target_collection = context.scene, units_per_metre(context.scene), collection or context.collection
+    scene, units, target_collection = context.scene, units_per_metre(context.scene), context.collection
     check_visible(trial)
     if target_collection.library is not None:
         raise InputError(target_collection.name, "a linked collection", "one of this file",
                          "choose another in the Outliner")
-    mesh = bpy.data.meshes.new(name or trial.name)
+    mesh = bpy.data.meshes.new(trial.name)
     mesh.vertices.add(len(trial.labels))
     _write_attribute(mesh, nodes.MARKER, "INT", np.arange(len(trial.labels), dtype=np.int32))
-    cloud = bpy.data.objects.new(name or trial.name, mesh)
+    cloud = bpy.data.objects.new(trial.name, mesh)
     target_collection.objects.link(cloud)
     properties = cloud.beyond_mocap_cloud
     properties.on = True

@@ -23,7 +23,7 @@ from ...beyond_mocap.motion import quaternion
 from ..core import action, channels, frame_range, sample
 from ..core.measure import frames_per_second, units_per_metre
 from ..core.properties import read_property_values
-from ..core.settings import to_absolute_path
+from ..core.settings import require_library_folder
 from ..rigs import armature
 from ..stage import ball as balls
 from ..stage import body
@@ -116,12 +116,9 @@ def find_clip_path(scene: bpy.types.Scene, name: str) -> Path:
     """
     from ...beyond_mocap.library.label_files import find_free_file
 
-    folder = scene.beyond_mocap.library_folder
-    if not folder:
-        raise InputError("library", "no folder", "a library folder", "choose one in step 1",
-                         fixes=(Fix("choose_library"),))
-    sample.check_not_sample(to_absolute_path(folder))
-    return find_free_file(Path(to_absolute_path(folder)), bpy.path.clean_name(name))
+    folder = require_library_folder(scene.beyond_mocap)
+    sample.check_not_sample(folder)
+    return find_free_file(Path(folder), bpy.path.clean_name(name))
 
 
 def show_reconstruction(context: bpy.types.Context, cloud: bpy.types.Object,

@@ -16,7 +16,7 @@ from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.files.tracking.feed import is_track_csv
 from ..core import preferences, sample
-from ..core.settings import to_absolute_path, to_setting_path
+from ..core.settings import require_library_folder, to_absolute_path, to_setting_path
 from ..player import tracks
 from .kits import DEFAULT_COLOURS, to_linear
 from .load import TEAMS, DisplayRequest
@@ -34,14 +34,14 @@ def build_command(scene: bpy.types.Scene) -> list[str]:
         out += ["--scheduler", match.scheduler]
     elif match.workers:
         out += ["--workers", str(match.workers)]
-    cache = preferences.find_cache_folder(_find_library_folder(settings))
+    cache = preferences.find_cache_folder(require_library_folder(settings))
     return out + (["--cache", cache] if cache else [])
 
 
 def build_display_request(scene: bpy.types.Scene, folder: str) -> DisplayRequest:
     """Build the request to display a match's folder."""
     settings, match = scene.beyond_mocap, scene.beyond_mocap_match
-    library = _find_library_folder(settings)
+    library = require_library_folder(settings)
     selected = tuple(player.feed_id for player in match.players if player.use)
     selected = selected if len(selected) < len(match.players) else ()
     start, end = float(format_float(match.start)), float(format_float(match.end))
@@ -159,7 +159,7 @@ def _build_arguments(scene: bpy.types.Scene) -> list[str]:
     settings, match = scene.beyond_mocap, scene.beyond_mocap_match
     if not match.tracking_file:
         raise InputError("match", "no tracking file", "a provider's tracking of a match", "choose one, or drop it here")
-    out = ["--tracking", to_absolute_path(match.tracking_file), "--library", _find_library_folder(settings)]
+    out = ["--tracking", to_absolute_path(match.tracking_file), "--library", require_library_folder(settings)]
     for option, path in (("--meta", match.metadata_file), ("--joints", match.joints_file),
                          ("--events", match.events_file)):
         out += [option, to_absolute_path(path)] if path else []
@@ -193,10 +193,3 @@ def _build_player_arguments(match: BeyondMocapMatch) -> list[str]:
         raise InputError("match", f"the list belongs to {Path(match.read_of).name}", "that of the tracking file",
                          "press Read Match, then select players", fixes=(Fix("press", "beyond_mocap.read_match"),))
     return ["--players", *selected]
-
-
-def _find_library_folder(settings) -> str:
-    if not settings.library_folder:
-        raise InputError("library", "no folder chosen", "a folder of clips", "choose one in step 1",
-                         fixes=(Fix("choose_library"),))
-    return to_absolute_path(settings.library_folder)

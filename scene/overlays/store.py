@@ -73,11 +73,10 @@ def update_reasons(scene: bpy.types.Scene) -> None:
         manager.beyond_mocap_playhead.why = text
 
 
-def seconds_at(scene: bpy.types.Scene, frame: float | None = None) -> float:
-    """Compute the time of the tracking file's clock at a scene frame, or now."""
+def seconds_at(scene: bpy.types.Scene) -> float:
+    """Compute the time of the tracking file's clock at the current frame."""
     settings = scene.beyond_mocap
-    frame = scene.frame_current_final if frame is None else frame
-    return settings.start_time + (frame - settings.start_frame) / frames_per_second(scene)
+    return settings.start_time + (scene.frame_current_final - settings.start_frame) / frames_per_second(scene)
 
 
 def take_to_world(scene: bpy.types.Scene, body: bpy.types.Object | None) -> Matrix:

@@ -141,12 +141,9 @@ def build_order(scene: bpy.types.Scene) -> Order:
 
 def run_order(order: Order, progress, cancelled, _hurry) -> Result:
     """Build the library if it is not loaded, and synthesize the scene. Does not use bpy."""
-    from ...beyond_mocap.library.build import build_library
     from ...beyond_mocap.passes.passes import synthesize_passes
 
-    library = order.library
-    if library is None:
-        library = build_library(order.folder, unit=order.unit, **order.build, progress=progress, cancelled=cancelled)
+    library = session.open_library(order, progress, cancelled)
     played_scene = synthesize_passes(library, order.scene, progress, cancelled)
     return Result(order, library, played_scene, build_trajectories(played_scene.plan, played_scene.kind, order.start))
 

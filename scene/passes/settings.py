@@ -216,6 +216,13 @@ def name_picture(hits: BeyondMocapHits) -> str:
     return digest.byte_digest(hits.found, size=8).hex()
 
 
+def needs_side(settings) -> bool:
+    """Return whether a strike by the part of these settings has a side to choose: no joint is named instead."""
+    from ...beyond_mocap.annotation.striking import SIDED_PARTS
+
+    return settings.part in SIDED_PARTS and not settings.bone
+
+
 def show_label(name: str) -> str:
     """Return a label's title, such as "Receive"."""
     from ...beyond_mocap.annotation.labels import find_label

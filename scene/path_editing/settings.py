@@ -8,8 +8,6 @@ from bpy.props import BoolProperty, FloatProperty, PointerProperty, StringProper
 from ..core.properties import read_property_values, with_settings
 from ..result.result import BeyondMocapBefore
 
-KINDS = (("BEZIER", "Bezier", "Points on the path, with handles"),
-         ("NURBS", "NURBS", "Control points beside the path: a B-spline, smoother, with fewer points"))
 SHAPES = (("FITTED", "Original", "Along the original path"),
           ("STRAIGHT", "Straight", "A straight line, as long as the original path, toward its end"),
           ("PRESENT", "As It Is", "Along the current path, with other points"))

@@ -17,7 +17,7 @@ from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.synthesis.plan import Plan
 from ...beyond_mocap.synthesis.take import Take
 from ..core import preferences, session
-from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, to_absolute_path
+from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, require_library_folder
 from . import freshness, plans, preview
 
 if TYPE_CHECKING:  # imported by the work itself: scipy and scikit-learn take a second, and enabling must be quick
@@ -116,9 +116,7 @@ def build_request(settings: BeyondMocapSettings, player: BeyondMocapPlayer, mode
     Raises:
         InputError: if an input is missing.
     """
-    if not settings.library_folder:
-        raise InputError("library", "no folder is chosen", "a folder of clips", "choose one in step 1",
-                         fixes=(Fix("choose_library"),))
+    folder, unit = require_library_folder(settings), settings.library_unit or None
     preview.check_body(player)
     plan, warnings = plans.build_plan(settings, player, still)
     session_take = session.find_take(player.take)
@@ -126,7 +124,6 @@ def build_request(settings: BeyondMocapSettings, player: BeyondMocapPlayer, mode
         found = f"no take of {player.name} in this session"
         raise InputError("resynthesize", found, "a take", "press Update first to compute it again",
                          fixes=(Fix("press", "beyond_mocap.update"),))
-    folder, unit = to_absolute_path(settings.library_folder), settings.library_unit or None
     return Request(player.name, mode, plan, where=plans.describe_label_source(player), warnings=warnings,
                    begin=player.take, before=session_take.take if session_take else None,
                    recipe=json.loads(player.result.recipe or "{}"), folder=folder, unit=unit,

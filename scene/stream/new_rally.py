@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from ..core import session
 from ..passes import generate as make
 
 if TYPE_CHECKING:
@@ -35,12 +36,9 @@ def start_rally(order: make.Order, holder: str, clock: tuple[float, float], part
     """Build the library if it is not loaded, find its strikes with `part`, and start a rally with all players standing,
     on a `clock` of seconds now and frames per second. Does not use bpy.
     """
-    from ...beyond_mocap.library.build import build_library
     from ...beyond_mocap.passes import live_passes
 
-    library = order.library
-    if library is None:
-        library = build_library(order.folder, unit=order.unit, **order.build, progress=progress, cancelled=cancelled)
+    library = session.open_library(order, progress, cancelled)
     rally = live_passes.start_rally(library, order.scene, holder, *clock, progress=progress, cancelled=cancelled)
     means = live_passes.collect_means(library, order.scene)
     means.list_likely(holder, part, "", None)

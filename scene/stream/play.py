@@ -256,10 +256,12 @@ def _answer_strike(scene, target: str, before_frame: bool = False) -> None:
 
 def _plan_ahead(scene, target: str) -> None:
     """Plan the likeliest answer that is not planned yet."""
+    from ...beyond_mocap.annotation.striking import SIDED_PARTS
+
     stream = follow.find_main_stream(scene, get_current_rally().holder)
     others = [player.name for player in get_current_rally().scene.players
               if player.name not in (target, get_current_rally().holder)]
-    side = stream.side if stream.part in ("foot", "hand", "tool") and stream.side != "either" else ""
+    side = stream.side if stream.part in SIDED_PARTS and stream.side != "either" else ""
     try:
         request = _session["ahead"].choose_next(stream.part, side, [target, *others],
                                                 scene.beyond_mocap_stream.bounces)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ...beyond_mocap.annotation.striking import SIDED_PARTS
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.passes.hits import HitMotion, detect_hits
 from ..core import action
@@ -16,7 +17,7 @@ def find_shown_strike(scene: bpy.types.Scene, body: bpy.types.Object) -> HitMoti
         InputError: if it has none.
     """
     settings, motion = scene.beyond_mocap_stream, action.read_motion(body, scene)
-    sided = settings.part in ("foot", "hand", "tool")
+    sided = settings.part in SIDED_PARTS
     sides = (("left", "right") if settings.side == "either" else (settings.side,)) if sided else ("",)
     hits = [hit for side in sides for hit in detect_hits(motion, settings.part, side, settings.threshold
                                                          or None).motions]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..core import session
 from .throw_task import ThrowTask
 
 if TYPE_CHECKING:
@@ -57,7 +58,6 @@ def generate_throw(order: ThrowTask, progress, cancelled, _hurry) -> ThrowPrevie
         cancelled: returns True to stop.
     """
     from ...beyond_mocap.ball.flight import simulate_flight
-    from ...beyond_mocap.library.build import build_library
     from ...beyond_mocap.motion.retargeting.retarget import Retargeter
     from ...beyond_mocap.throws.join_throw import (
         FADE,
@@ -69,9 +69,7 @@ def generate_throw(order: ThrowTask, progress, cancelled, _hurry) -> ThrowPrevie
     )
     from ...beyond_mocap.throws.leave_path import leave_path
 
-    library = order.library
-    if order.folder and library is None:
-        library = build_library(order.folder, unit=order.unit, **order.build, progress=progress, cancelled=cancelled)
+    library = session.open_library(order, progress, cancelled) if order.folder else order.library
     own_motion = order.own_motion
     if own_motion is None:
         own_motion = build_standing_motion(order.skeleton, 0.0, order.fps, order.place, order.facing)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation import Timeline, parse_timeline
+from beyond_mocap.cli.main import main
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library import synthetic_clips
 from beyond_mocap.library.build import build_library
@@ -110,6 +111,19 @@ def clips_folder(tmp_path_factory) -> Path:
     text = f"0 2 jogging front\n{kick.start:.3f} {kick.end:.3f} {KICK}\n{kick.key:.3f} {KICK}\n"
     write_clip(folder / "kick.bvh", kick.motion, text)
     return folder
+
+
+@pytest.fixture
+def run(capfd):
+    """run(*arguments) -> status of the command line, standard output, lines on standard error."""
+
+    def call(*arguments):
+        capfd.readouterr()
+        status = main([str(argument) for argument in arguments])
+        out, error = capfd.readouterr()
+        return status, out, error.splitlines()
+
+    return call
 
 
 @pytest.fixture(scope="session")

@@ -13,19 +13,17 @@ import numpy as np
 Field = Callable[[np.ndarray], np.ndarray]
 
 
-def build_ellipsoid(centre, radii, tilt: float = 0.0) -> Field:
+def build_ellipsoid(centre, radii) -> Field:
     """Build an ellipsoid.
 
     Args:
         centre: (3,) m.
-        radii: (3,) m.
-        tilt: radians about the left axis; positive lowers its front.
+        radii: (3,) m along x, y and z.
     """
     middle, half = np.array(centre, dtype=float), np.array(radii, dtype=float)
-    turn = np.array([[np.cos(tilt), 0.0, -np.sin(tilt)], [0.0, 1.0, 0.0], [np.sin(tilt), 0.0, np.cos(tilt)]])
 
     def measure(points: np.ndarray) -> np.ndarray:
-        scaled = ((points - middle) @ turn.T) / half
+        scaled = (points - middle) / half
         first = np.linalg.norm(scaled, axis=1)
         return first * (first - 1.0) / np.maximum(np.linalg.norm(scaled / half, axis=1), 1e-9)
 

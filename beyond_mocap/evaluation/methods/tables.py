@@ -67,9 +67,9 @@ def _read_seconds(result: MethodResult) -> float:
     return result.seconds
 
 
-def _read_level(share: float, scale: float = 100.0) -> Read:
+def _read_level(share: float) -> Read:
     """Build a function that reads a percentile of the smoothness curve, cm."""
-    return lambda result: scale * float(np.percentile(result.smoothness, share)) if len(result.smoothness) else None
+    return lambda result: 100.0 * float(np.percentile(result.smoothness, share)) if len(result.smoothness) else None
 
 
 SMOOTH_P95, SMOOTH_MAX = _read_level(95.0), _read_level(100.0)

@@ -27,6 +27,7 @@ _STRAY_RATIO, _STRAY_SECONDS = 1.5, 0.1
 _BREAK_MARGIN = 3  # frames from a leap or a gap within which such a stretch must begin or end
 
 
+_LONGEST_FILLING = 0.08  # s up to which a soft or curved filling is evidence for a pose
 _MAX_LINES = 6  # messages of one kind; with more, one message covers all markers
 
 
@@ -184,19 +185,17 @@ class CleaningResult(NamedTuple):
     trial: MarkerTrial
     report: CleanReport
 
-    def build_pose_trial(self, longest: float = 0.08) -> MarkerTrial:
+    def build_pose_trial(self) -> MarkerTrial:
         """Return the trial for the pose solver, without long uncertain fillings.
 
         Gaps filled softly or by a curve are good for display, but no evidence for a pose.
 
-        Args:
-            longest: seconds up to which such a filling stays.
         Returns:
             The trial.
         """
         positions = np.array(self.trial.positions)
         for gap in self.report.gaps:
-            if gap.how != "cluster" and gap.frames > longest * self.trial.fps:
+            if gap.how != "cluster" and gap.frames > _LONGEST_FILLING * self.trial.fps:
                 first = round((gap.start - self.trial.start) * self.trial.fps)
                 positions[first : first + gap.frames, self.trial.index_of(gap.labels[0])] = np.nan
         return self.trial.with_positions(positions)
@@ -233,11 +232,11 @@ class _CleanUp:
         """Return whether a marker is visible in any frame."""
         return np.isfinite(self.positions[:, marker, 0]).any()
 
-    def build_stretch(self, labels, first, end, how="", off=0.0, frames=None):
+    def build_stretch(self, labels, first, end, how="", off=0.0):
         """Build the stretch of these markers' frames, in seconds."""
         clock = self.trial.start + np.array([first, end - 1]) / self.trial.fps
         names = tuple(self.trial.labels[i] for i in labels)
-        return Stretch(labels=names, start=float(clock[0]), end=float(clock[1]), frames=frames or end - first, how=how,
+        return Stretch(labels=names, start=float(clock[0]), end=float(clock[1]), frames=end - first, how=how,
                        off=float(off))
 
 

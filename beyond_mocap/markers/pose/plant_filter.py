@@ -31,9 +31,10 @@ from ...motion.humanoid import Limb, identify_joints
 from ...motion.limb import solve_posed_limb
 from ...motion.motion import Motion, compute_pose
 
-WINDOW, STILL, EASE, APART = 0.5, 0.0015, 0.1, 0.01
-"""Seconds of the window (100 frames at 200 per second in the source), metres between the halves' means, seconds of
-easing in and out, and metres from the held place beyond which a point is not in contact."""
+WINDOW, STILL = 0.5, 0.0015
+"""Seconds of the window (100 frames at 200 per second in the source), and metres between the halves' means."""
+
+_EASE, _APART = 0.1, 0.01  # s of easing in and out; metres from the held place beyond which a contact ends
 
 # Ankle and toe in a stance: m/s up to which they stand (a heel that rises over standing toes reaches 1 m/s in sprints),
 # and metres that they may lie off their held place (toe markers of standing feet travel 40 mm in hard pitches).
@@ -63,8 +64,7 @@ class PlantFilterResult:
     miss: np.ndarray
 
 
-def filter_foot_plants(motion: Motion, window: float = WINDOW, max_drift: float = STILL, ease: float = EASE,
-                       max_distance: float = APART) -> PlantFilterResult:
+def filter_foot_plants(motion: Motion, window: float = WINDOW, max_drift: float = STILL) -> PlantFilterResult:
     """Hold ankles and toes in place where they are in contact.
 
     Only leg joints change, in frames in which something is held or released.
@@ -73,22 +73,20 @@ def filter_foot_plants(motion: Motion, window: float = WINDOW, max_drift: float 
         motion: T frames.
         window: seconds.
         max_drift: metres between the means of both halves of the window, up to which a point is in contact.
-        ease: seconds of easing in and out.
-        max_distance: metres from the held place beyond which a contact ends.
     Returns:
         The motion, what is held, and the corrections.
     Raises:
         InputError: if the skeleton has no two legs, or a number is not positive.
     Source: Fredriksson section 5.4.
     """
-    if min(window, max_drift, ease, max_distance) <= 0:
-        raise InputError("foot plant", f"{window} s, {max_drift} m, {ease} s, {max_distance} m", "positive numbers")
+    if min(window, max_drift) <= 0:
+        raise InputError("foot plant", f"{window} s, {max_drift} m", "positive numbers")
     body = identify_joints(motion.skeleton)
     places, world = compute_pose(motion.skeleton, motion.root_positions, motion.rotations)
     rotations = np.array(motion.rotations)
     held = np.zeros((len(motion), 2, 2), bool)
     moved, miss = np.zeros((len(motion), 2)), np.zeros((len(motion), 2))
-    sizes = max(2, round(window * motion.fps / 2.0)), max_drift, max_distance
+    sizes = max(2, round(window * motion.fps / 2.0)), max_drift, _APART
     is_low = detect_heel_toe_contacts(motion)
     for side, limb in enumerate((body.left, body.right)):
         points = [places[:, limb.foot], places[:, limb.toe_or_foot]]
@@ -96,7 +94,7 @@ def filter_foot_plants(motion: Motion, window: float = WINDOW, max_drift: float 
                                                  swing_share=kind * _SWING_SHARE),
                                   detect_contacts(point, *sizes), len(motion)) for kind, point in enumerate(points)]
         held[:, side] = np.stack([_build_mask(spans, len(motion)) for spans in contacts], axis=1)
-        shifts = [compute_hold_shift(point, spans, max(1, round(ease * motion.fps))) for point,
+        shifts = [compute_hold_shift(point, spans, max(1, round(_EASE * motion.fps))) for point,
                   spans in zip(points, contacts)]
         foot = _Foot(limb, places, world, *shifts)
         active = np.flatnonzero(foot.weight > 0)

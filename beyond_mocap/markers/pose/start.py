@@ -14,25 +14,24 @@ from .chain import CONJUGATE, Chain, Poses, limit_angles, multiply, read_angles,
 
 # weight of the next joint's markers relative to a joint's own; again this factor for each joint below
 _BELOW_FACTOR = 0.01
+_UNTURNED = np.array([[1.0], [0.0], [0.0], [0.0]])
 _PARENT_WEIGHT = 4e-4  # m2, weight of the parent's direction, for angles that markers do not determine
 
 
-def estimate_initial_poses(chain: Chain, seen: np.ndarray, weights: np.ndarray, guess: Poses | None = None) -> Poses:
+def estimate_initial_poses(chain: Chain, seen: np.ndarray, weights: np.ndarray) -> Poses:
     """Estimate poses of frames, each from its own markers.
 
     Args:
         chain: the chain.
         seen: (M, 3, F) metres, any numbers where the weight is 0.
         weights: (M, F).
-        guess: local rotations for what markers leave undetermined; None for the rest pose.
     Returns:
-        F poses.
+        F poses; what markers leave undetermined is as in the rest pose.
     """
     skeleton, frames = chain.skeleton, weights.shape[-1]
     rest, distance = _place_at_rest(chain)
     local = np.zeros((len(skeleton), 4, frames))
     local[:, 0] = 1.0
-    default_rotations = local.copy() if guess is None else guess.local
     angles = np.zeros((len(skeleton), 3, frames))
     # markers have less weight the more joints they lie below
     share = weights * _BELOW_FACTOR ** distance[0][:, None]
@@ -43,11 +42,11 @@ def estimate_initial_poses(chain: Chain, seen: np.ndarray, weights: np.ndarray, 
     for joint in range(1, len(skeleton)):
         parent = skeleton.parents[joint]
         joints.append(joints[parent] + np.einsum("abf,b->af", to_matrices(world[parent]), skeleton.offsets[joint]))
-        before = multiply(world[parent], default_rotations[joint])
         near = np.flatnonzero(np.isfinite(distance[joint]))
         share = weights[near] * _BELOW_FACTOR ** distance[joint][near][:, None]
         arms = rest[near] - chain.skeleton.rest_positions[joint]
-        world.append(_fit_joint(arms, seen[near] - joints[joint], share, before))
+        prior = multiply(world[parent], _UNTURNED)  # of unit length again
+        world.append(_fit_joint(arms, seen[near] - joints[joint], share, prior))
         local[joint] = multiply(world[parent] * CONJUGATE, world[joint])
         if not chain.is_fully_free[joint]:
             angles[joint] = limit_angles(chain, joint, read_angles(chain, joint, local[joint]))

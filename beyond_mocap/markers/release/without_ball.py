@@ -61,7 +61,6 @@ class HandRelease:
         time_margin: s, half the interval that holds 90 % of the cases.
         speed_margin: m/s, likewise.
         direction_margin: rad, half the angle of the cone that holds 90 %.
-        roll_time: s that the ball took along the fingers.
     """
 
     time: float
@@ -70,7 +69,6 @@ class HandRelease:
     time_margin: float
     speed_margin: float
     direction_margin: float
-    roll_time: float
 
 
 def estimate_hand_release(hand: Hand, radius: float, stride: np.ndarray | None = None) -> HandRelease:
@@ -101,8 +99,7 @@ def estimate_hand_release(hand: Hand, radius: float, stride: np.ndarray | None =
     position = path.places_at(PAD)[k] + radius * push
     time_margin = float(np.hypot(max(TIME_MARGIN, _ROLL_MARGIN * roll_time), _FRAME_MARGIN / hand.fps))
     return HandRelease(time=float(times[k]), position=position, velocity=velocity, time_margin=time_margin,
-                       speed_margin=SPEED_MARGIN * float(np.linalg.norm(velocity)), direction_margin=DIRECTION_MARGIN,
-                       roll_time=float(roll_time))  # fmt: skip
+                       speed_margin=SPEED_MARGIN * float(np.linalg.norm(velocity)), direction_margin=DIRECTION_MARGIN)
 
 
 def measure_roll_time(hand: Hand, time: float) -> float:

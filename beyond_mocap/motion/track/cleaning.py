@@ -36,7 +36,6 @@ class DataReport:
         merged: rows whose time repeated.
         filled, outliers: samples inserted and replaced.
         gaps: (start, end) seconds between measured samples.
-        ball_unknown: samples without the ball.
         warnings: those lines that need attention.
     """
 
@@ -47,7 +46,6 @@ class DataReport:
     filled: int
     outliers: int
     gaps: tuple[tuple[float, float], ...]
-    ball_unknown: int
     warnings: tuple[str, ...]
 
 
@@ -265,7 +263,7 @@ def _build_report(track: Track, notes: list[str], snaps: tuple[float, ...], *, d
     return DataReport(
         lines=(*notes, *_describe_replacements(track), *warnings), rate=1.0 / track.interval, dropped=dropped,
         merged=merged, filled=int(track.filled.sum()), outliers=int(track.outlier.sum()), gaps=gaps,
-        ball_unknown=int(np.count_nonzero(_find_missing_ball(track))), warnings=tuple(warnings),
+        warnings=tuple(warnings),
     )
 
 

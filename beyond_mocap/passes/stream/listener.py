@@ -69,7 +69,6 @@ class StreamStatus:
             "failed", or "stopped".
         frames: total number of frames.
         rate: frames per second, recently.
-        idle: s since the last frame.
         delay: median delay in s from sender to listener; None if the sender sends no times.
         invalid_count: number of invalid pieces.
         line: one line for the user.
@@ -78,7 +77,6 @@ class StreamStatus:
     state: str
     frames: int
     rate: float
-    idle: float
     delay: float | None
     invalid_count: int
     line: str
@@ -181,7 +179,7 @@ class Listener:
         if state == "receiving" and idle > STALL_SECONDS:
             state = "stalled"
         delay = statistics.median(delays) if delays else None
-        return StreamStatus(state=state, frames=count, rate=rate, idle=idle, delay=delay,
+        return StreamStatus(state=state, frames=count, rate=rate, delay=delay,
                             invalid_count=self.stream.invalid_count, line=self._describe(state, rate, idle))
 
     def _describe(self, state: str, rate: float, idle: float) -> str:

@@ -15,6 +15,7 @@ from itertools import islice
 
 import numpy as np
 
+from ...annotation.striking import SIDED_PARTS
 from ...ball.contact import Tool
 from ...motion.motion import Motion, forward_kinematics
 from ..hits import HitMotion, detect_hit_under_way, detect_hits
@@ -48,7 +49,7 @@ class LiveHits:
     def __init__(self, listener: Listener, part: str = "foot", side: str = "", threshold: float | None = None,
                  tool: Tool | None = None):
         self.listener, self.part, self.threshold, self.tool = listener, part, threshold, tool
-        sided = part in ("foot", "hand", "tool")
+        sided = part in SIDED_PARTS
         self.sides = ((side,) if side else ("left", "right")) if sided else ("",)
         self._after = self._seen_until = float("-inf")
         self._last_number = 0
@@ -149,7 +150,7 @@ class LiveHits:
         return measures
 
 
-def build_recording(listener: Listener, seconds: float, rate: float | None = None) -> Motion | None:
+def build_recording(listener: Listener, seconds: float) -> Motion | None:
     """Build a motion from the last seconds of a stream.
 
     Networks deliver frames in bursts, so the frames are spaced evenly from the first to the last.
@@ -157,7 +158,6 @@ def build_recording(listener: Listener, seconds: float, rate: float | None = Non
     Args:
         listener: the listener.
         seconds: how much of the stream.
-        rate: most frames per second; None: all.
     Returns:
         The motion, or None if there are fewer than two frames.
     """
@@ -165,7 +165,7 @@ def build_recording(listener: Listener, seconds: float, rate: float | None = Non
     frames = [frame for frame in frames if frame.time > frames[-1].time - seconds]
     if len(frames) < 2 or frames[-1].time <= frames[0].time:
         return None
-    frames, fps = _choose_frames(frames, rate)
+    frames, fps = _choose_frames(frames)
     return Motion(*convert_poses(frames), fps)
 
 

@@ -11,6 +11,7 @@ from ...annotation.striking import find_nearest_point, measure_ball_gap
 from ...base.easing import quintic_step_by_powers
 from ...base.vectors import unit_vectors
 from ...motion.quaternion import rotate_about_up
+from ...motion.supports import GRAVITY
 from ...motion.track import BALL_RADIUS
 
 BALL_SECONDS = 0.3  # s before and after a key moment over which the ball's shift grows and fades
@@ -22,7 +23,6 @@ _ANGLE_COST = 0.08  # per radian off the part's own direction
 _ALONG_COST = 0.1  # per share of the line off its middle
 _INSIDE_COST = 15.0  # per metre of ball inside the other leg
 _MISS_COST = 3.0  # per metre that the part cannot be moved
-_GRAVITY = 9.81  # m/s^2
 _ON_GROUND = 0.02  # m above its radius up to which a ball counts as on the ground
 
 Line = tuple[np.ndarray, np.ndarray]
@@ -204,7 +204,7 @@ def add_flight_arc(ball: np.ndarray, frame: float, height: float, free: np.ndarr
         (T, 3) m; never lower than before.
     """
     seconds = (np.arange(len(ball)) - frame) / fps
-    arc = height - 0.5 * _GRAVITY * seconds**2
+    arc = height - 0.5 * GRAVITY * seconds**2
     out = ball.copy()
     out[:, 2] = np.where(free & (arc > ball[:, 2]), arc, ball[:, 2])
     return out

@@ -12,8 +12,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ...annotation.ball_contact import build_surfaces
-from ...annotation.labels import list_labels
+from ...annotation.ball_contact import TAKING, build_surfaces
 from ...annotation.striking import Surface, measure_ball_gap
 from ...base.easing import smoothstep
 from ...base.time_series import interpolate_columns
@@ -25,7 +24,6 @@ GIVE_SECONDS, ROLL_SECONDS = 0.1, 0.3
 """Seconds after the touch in which the ball goes with the part, and after which it is back on its course."""
 
 _GIVING = frozenset({"foot", "thigh", "chest"})
-_TAKES = frozenset(list_labels(ball="takes"))
 _NEAR = 0.03  # m of gap up to which a part has met the ball
 
 
@@ -49,7 +47,7 @@ def give_with_ball(
     """
     start = held[1]
     count = int(min(round(ROLL_SECONDS * fps), until - start, len(ball) - 1 - start))
-    if not _TAKES & set(words) or count < 2 or not np.isfinite(ball[start : start + count + 1]).all():
+    if not TAKING & set(words) or count < 2 or not np.isfinite(ball[start : start + count + 1]).all():
         return ball
     span = slice(start, start + count + 1)
     places, world = compute_pose(skeleton, root[span], rotations[span])

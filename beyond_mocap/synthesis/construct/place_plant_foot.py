@@ -9,8 +9,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ...annotation.ball_contact import find_striking_part
-from ...annotation.labels import list_labels
+from ...annotation.ball_contact import SENDING, find_striking_part
 from ...annotation.vocabulary import SIDES
 from ...base.easing import smoothstep
 from ...base.time_series import find_runs
@@ -26,7 +25,6 @@ MAX_PLANT_SHIFT = 0.12
 """Metres by which the step onto the plant foot goes elsewhere than recorded."""
 
 _AROUND_SECONDS = (0.5, 0.8)  # s before and after a kick in which its plant foot gets to its place and back
-_SENDING = frozenset(list_labels(ball="sends"))
 _MARGIN = 0.02  # m inside the range
 _LEAST_SECONDS = 0.1  # in the air before and after the stance, in which the foot gets there and back
 _SHARES = (1.0, 0.75, 0.5, 0.25)  # of the shift, the first of which the leg follows
@@ -77,7 +75,7 @@ def _iter_kicks(touches: Sequence[Touch], count: int, fps: float) -> Iterator[tu
 def _find_kicking_side(touch: Touch) -> str:
     """Find the side of the foot that sends a ball, "" where the touch is no kick of one foot."""
     sides = [side for side in SIDES if side in touch.words]
-    is_kick = not touch.misses and bool(_SENDING & set(touch.words)) and find_striking_part(touch.words) == "foot"
+    is_kick = not touch.misses and bool(SENDING & set(touch.words)) and find_striking_part(touch.words) == "foot"
     return sides[0] if is_kick and len(sides) == 1 else ""
 
 

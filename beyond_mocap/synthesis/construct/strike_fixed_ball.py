@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...annotation.striking import Surface, find_nearest_point, measure_ball_gap
+from ...annotation.striking import SIDED_PARTS, Surface, find_nearest_point, measure_ball_gap
 from ...motion.humanoid import identify_joints
 from ...motion.motion import Motion
 from .contact_geometry import ease_around
@@ -147,7 +147,7 @@ def _measure_gap(body: Body, strike: FixedStrike, at: int) -> float:
 def _move_part(body: Body, surface: Surface, at: int, shift: np.ndarray, share: np.ndarray, has_ground: bool) -> Body:
     """Move the surface by `shift` (3,) m at frame `at`, by its share (W,) around it."""
     root, rotations = body.root, body.rotations
-    if surface.part in ("foot", "hand", "tool"):
+    if surface.part in SIDED_PARTS:
         chain, most = limb_chain(body.skeleton, surface), MAX_SWING["foot" if surface.part == "foot" else "hand"]
         swing = solve_swing(body, chain, at, body.places[at, chain[2]] + shift, most)
         moves = compute_swing_shift(body, chain, swing, share)

@@ -19,6 +19,7 @@ from ...motion.foot_plant import compute_contact_weights
 from ...motion.humanoid import identify_joints, pose_legs
 from ...motion.motion import compute_world_rotation
 from ...motion.skeleton import Skeleton
+from ...motion.supports import GRAVITY
 from ...motion.track import smooth_zero_phase_hann
 
 TURN_WEIGHT = 12.0  # weight of the recording's own turning per frame, against the direction of travel
@@ -44,7 +45,6 @@ FAINT_WEIGHT = 1e-4  # weight of that pull at any speed, so that there is one so
 GIVEN_HEADING_WEIGHT = 1e6  # weight of a given heading, so large that it stays
 ROOT_WINDOW = 1.5  # s, the window through which the root lies on the track
 
-GRAVITY = 9.81
 LEGS_LEAN, TRUNK_LEAN = 0.5, 0.2
 """Share of a / g by which legs and trunk lean; recorded legs lean by 0.7 to 0.8 of it and the trunk by a quarter."""
 

@@ -10,8 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...annotation.ball_contact import build_surfaces, find_contact_window
-from ...annotation.labels import list_labels
+from ...annotation.ball_contact import SENDING, build_surfaces, find_contact_window
 from ...annotation.striking import Surface, trace_fastest_surface
 from ...base.vectors import arctan2
 from ...motion import quaternion
@@ -26,7 +25,6 @@ MAX_TURN_TO_BALL = np.radians(60.0)
 _FULL_TURN_SPEED = 3.0  # m/s up to which a body turns by MAX_TURN_TO_BALL: a faster one would drag its plant foot
 _BALL_TURN_SECONDS = 0.5  # s before and after the key frame over which the turn grows and fades
 _NEAR, _CLEAR = 0.1, 0.35  # m from the hips: below the first a direction has no weight, above the second all
-_SENDING = frozenset(list_labels(ball="sends"))
 _TURNING = frozenset({"foot", "hand"})
 
 
@@ -70,7 +68,7 @@ def _turn_at_touch(skeleton: Skeleton, root, rotations, *, ball, touch: Touch, f
     part, goal = trace[1] - root[frame, :2], ball[frame, :2] - root[frame, :2]
     clear = np.clip((min(np.linalg.norm(part), np.linalg.norm(goal)) - _NEAR) / (_CLEAR - _NEAR), 0.0, 1.0)
     exit_turn, speed = 0.0, measure_level_speed(root, frame, fps)
-    if _SENDING.intersection(touch.words):
+    if SENDING.intersection(touch.words):
         exit_turn = _turn_to_exit(0.5 * fps * (trace[2] - trace[0]), _measure_exit_velocity(ball, frame, fps))
         exit_turn = np.clip(exit_turn, -compute_free_turn(speed), compute_free_turn(speed))
     turn = exit_turn + clear * (_limit_to_reach(exit_turn, part, goal) - exit_turn)

@@ -8,7 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...annotation import KeyMoment
-from ...annotation.ball_contact import choose_contact_labels, find_contact_window, measure_contact_gap, takes_with_foot
+from ...annotation.ball_contact import (
+    choose_contact_labels,
+    find_contact_window,
+    list_contact_labels,
+    measure_contact_gap,
+    takes_with_foot,
+)
 from ...annotation.striking import build_part_surfaces, measure_smallest_gap
 from ...library.clip import SYNTHETIC_FOLDER
 from ...library.library import Library
@@ -43,6 +49,11 @@ class KeyMomentResult:
     entry: int
     exit: int
     used_instead: tuple[str, ...] | None
+
+    @property
+    def contact_labels(self) -> tuple[str, ...]:
+        """Labels that define the part that meets the ball (`ball_contact.list_contact_labels`)."""
+        return list_contact_labels(self.words, self.requested)
 
 
 def evaluate_moments(played: Playback, keys: tuple[KeyMoment, ...], stride: np.ndarray, library: Library
@@ -150,7 +161,7 @@ def measure_ball_gap(played: Playback, moment: KeyMomentResult) -> float:
         return np.nan
     pose = played.positions[moment.frame], played.rotations[moment.frame]
     ball = find_written_ball(played, moment.frame)
-    return abs(float(measure_contact_gap(played.motion.skeleton, *pose, list_contact_labels(moment), ball)))
+    return abs(float(measure_contact_gap(played.motion.skeleton, *pose, moment.contact_labels, ball)))
 
 
 def measure_miss(played: Playback, moment: KeyMomentResult) -> float:
@@ -175,7 +186,7 @@ def measure_contact(played: Playback, moment: KeyMomentResult) -> tuple[float, f
     Returns:
         Seconds on the track's clock and m, as in `measure_ball_gap`; NaN without ball or part.
     """
-    last = min(moment.frame + int(find_contact_window(list_contact_labels(moment)) * played.motion.fps),
+    last = min(moment.frame + int(find_contact_window(moment.contact_labels) * played.motion.fps),
                len(played.motion) - 1)
     frames = range(moment.frame, last + 1)
     gaps = [measure_ball_gap(played, replace(moment, frame=frame)) for frame in frames]
@@ -183,13 +194,6 @@ def measure_contact(played: Playback, moment: KeyMomentResult) -> tuple[float, f
         return np.nan, np.nan
     nearest = int(np.nanargmin(gaps))
     return float(played.times[frames[nearest]]), gaps[nearest]
-
-
-def list_contact_labels(moment: KeyMomentResult) -> tuple[str, ...]:
-    """Return the labels that say which part meets the ball (`ball_contact.choose_contact_labels`); none if the moment
-    misses it by design.
-    """
-    return () if moment.requested.misses_ball else choose_contact_labels(moment.words, moment.requested.words)
 
 
 def find_written_ball(played: Playback, frame: int) -> np.ndarray:

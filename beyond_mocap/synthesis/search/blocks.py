@@ -28,11 +28,9 @@ from ...library.keys import Key
 from ...library.library import Library
 from .block_choice import rank_varied
 from .block_costs import AnnotationCost, collect_windows, compute_distances, measure_typical_distance
-from .preferences import compute_weak_foot_cost
+from .preferences import AVOIDED_COST, compute_weak_foot_cost
 from .request import SearchRequest, compute_needed_frames, library_frame
 
-AVOIDED_COST = 1000.0
-"""Cost of a block that shows an avoided label: more than a whole track of anything else."""
 FINEST_LENGTH = BLOCK_LENGTHS[-1]  # frames
 SEARCH_MORE = "a higher Most Blocks compares more and takes longer"
 

@@ -9,12 +9,14 @@ from functools import cached_property
 import numpy as np
 
 from ...annotation import CONTINUOUS, DISCRETE
+from ...annotation.ball_contact import SENDING
 from ...annotation.gaits import TURNING
 from ...annotation.labels import list_gaits, list_labels
 from ...base.time_series import compute_running_maximum
 from ...base.vectors import arctan2
 from ...library import cache
 from ...library.library import Library
+from ..quality.movement import JERK_REACH, classify_speed
 from .block_costs import AnnotationCost
 
 STAND_SPEED = 0.2  # m/s that a clip of a stand never exceeds
@@ -24,15 +26,13 @@ PLAYBACK_RATES = np.array([0.875, 0.9375, 1.0, 1.0625, 1.125])  # playback rates
 MOST_STRANGE = 3.0  # radii beyond the region of normal locomotion at which the cost stops growing
 _SHOWN_FASTEST = int(np.ceil(SLOT * PLAYBACK_RATES[-1]))  # library frames that a usual slot shows at most
 BUCKET = 40  # library frames that count as one for replayed stretches
-JERK_REACH = 8  # frames to either side over which the jerk of a transition is measured
-_SPEED_CLASSES = (1.0, 2.0, 3.0, 4.5)  # m/s between the classes in which jerk is compared
 USUAL_STANCE = 0.3  # s with both feet on the ground, in a walk
 _LONGEST_STANCE = 2.0  # s beyond the usual stance at which its cost stops growing
 ACTING = CONTINUOUS - {TURNING, *list_gaits(), *list_labels(ball="carries")}
 """Labels of what a body does for a while besides going, turning and carrying the ball; synthetic clips show it only
 where it is requested (recordings of it are judged by their posture)."""
-STRIKES, STRIKE_COST = frozenset(list_labels(ball="sends")), 4.0
-"""Labels of a ball that is struck, and how many times as much they cost as other actions that are not requested: a kick
+STRIKE_COST = 4.0
+"""How many times as much labels of a ball that is struck cost as other actions that are not requested: a kick
 without a ball is the last thing to fill a run with."""
 
 _STORED = ("is_synthetic", "strange", "recording", "is_made_travel", "speed", "turn", "valid", "by_speed", "offset",
@@ -227,7 +227,7 @@ class CandidateIndex:
             actions, spans = ([i for i, word in enumerate(names) if word in kind and word not in words]
                               for kind in (DISCRETE, ACTING))
             acts = frames.words[:, actions].any(axis=1) | (frames.words[:, spans].any(axis=1) & self.is_synthetic)
-            strikes = frames.words[:, [i for i, word in enumerate(names) if word in STRIKES - words]].any(axis=1)
+            strikes = frames.words[:, [i for i, word in enumerate(names) if word in SENDING - words]].any(axis=1)
             shown = np.where(strikes, STRIKE_COST, acts)
             lacking = np.maximum(compute_running_maximum(shown, 0, SLOT), ~frames.words.any(axis=1))
             self._by_words[words] = missing.astype(np.float32), lacking.astype(np.float32)
@@ -255,7 +255,7 @@ def measure_wildness(library: Library) -> tuple[np.ndarray, np.ndarray]:
     from scipy.ndimage import maximum_filter1d
 
     frames = library.frames
-    kind = np.digitize(frames.speed, _SPEED_CLASSES)
+    kind = classify_speed(frames.speed)
     around = maximum_filter1d(frames.jerk, 2 * JERK_REACH + 1, mode="nearest")
     # 90th percentile in the speed class; inf where the library has no frame of the class
     usual = np.array([np.percentile(around[kind == k], 90) if np.any(kind == k) else np.inf for k in range(5)])

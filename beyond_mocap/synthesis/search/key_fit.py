@@ -16,8 +16,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from ...annotation.ball_contact import build_surfaces, find_striking_part
-from ...annotation.labels import list_labels
+from ...annotation.ball_contact import SENDING, build_surfaces, find_striking_part
 from ...annotation.striking import trace_fastest_surface
 from ...annotation.vocabulary import SIDES
 from ...base.time_series import interpolate_columns
@@ -63,7 +62,6 @@ _NOISE = 0.15  # m by which a tracked ball may be off without saying anything ab
 TURN_REACH = 0.25  # m between part and ball that the ball's noise and the limb make up for
 _FARTHEST = 1.0  # m on the ground beyond which the cost does not grow
 _LOFT_NOISE = np.radians(15.0)  # a foot that meets the ball below its middle lifts it by more than it rises itself
-_SENDING = frozenset(list_labels(ball="sends"))
 _MET = 0.4  # m between the middle of a part and a recorded ball that it meets
 _STILL_SPEED = 0.5  # m/s up to which a direction of travel is noise: there the body's facing stands for it
 _MOMENT = 1.0 / 30.0  # s before and after a key frame between which velocities are measured: frames of most takes
@@ -175,7 +173,7 @@ def _measure_rows(library: Library, keys: Sequence[Key]) -> list[tuple]:
     rows = [_measure_strike(library, key, p, r, a) for key, p, r, a in zip(keys, places, rotations, back)]
     place, height, velocity, plant_off = (np.array(values) for values in zip(*rows))
     velocity[:, 0] -= np.linalg.norm(library.frames.velocity[frame], axis=1)
-    sends = np.array([bool(_SENDING & key.labels) for key in keys])
+    sends = np.array([bool(SENDING & key.labels) for key in keys])
     return list(zip(place, height, velocity, sends, np.where(sends, plant_off, 0.0)))
 
 

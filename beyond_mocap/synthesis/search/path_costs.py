@@ -20,7 +20,7 @@ from .candidate_index import ACTING, PLAYBACK_RATES, SLOT, CandidateIndex, RateP
 from .cost_weights import Term, Weights
 from .cut_costs import BoneDistance, CutCosts
 from .lean_cost import compute_lean_cost, compute_wanted_lean
-from .preferences import UsedStretch, compute_reuse_cost
+from .preferences import AVOIDED_COST, UsedStretch, compute_reuse_cost
 from .request import SearchRequest
 
 _ROUNDING = 1e-3  # m/s, for float32
@@ -81,9 +81,6 @@ def _locate_speeds(speeds: np.ndarray, values: Sequence[float]) -> np.ndarray:
 
 _PLAIN = frozenset((*LOCOMOTION, *DIRECTIONS, TURNING))  # labels that do not ask for an unusual posture
 _NEAR_KEY = 45  # frames around a key moment in which its own labels may be shown
-
-AVOIDED_COST = 1000.0
-"""Cost of a slot that shows an avoided label: more than a whole track of anything else."""
 
 class PathCosts:
     """The costs of one request on one library of N frames."""

@@ -18,12 +18,14 @@ from pathlib import PurePosixPath
 
 import numpy as np
 
-from ...annotation.ball_contact import may_use_foot
-from ...annotation.labels import list_labels
+from ...annotation.ball_contact import SENDING, may_use_foot
 from ...annotation.vocabulary import SIDES, compute_edit_distance
 from ...base.errors import InputError
 from ...library.keys import Key
 from ...library.library import Library
+
+AVOIDED_COST = 1000.0
+"""Cost of a stretch that shows an avoided label: more than a whole track of anything else."""
 
 WEAK_FOOT_WEIGHT = 1.5
 """Cost of serving a key moment with the weak foot, in metres per second of missed speed."""
@@ -33,7 +35,6 @@ UNUSUAL_FOOT_WEIGHT = 0.15
 quarter of a metre of the ball's place."""
 
 _SIDES = frozenset(SIDES)
-_SENDING = frozenset(list_labels(ball="sends"))
 
 PERIOD = 3.6
 """Seconds from one preferred lag to the next."""
@@ -119,7 +120,7 @@ def matches_pattern(path: str, pattern: str) -> bool:
 def find_unusual_foot(library: Library) -> str:
     """Find the side of the foot with which the recorded players seldom send a ball; "" where neither is."""
     own = [key.labels for key in library.keys if not library.clips[key.clip].mirrored
-           and not library.clips[key.clip].is_synthetic and _SENDING & key.labels and may_use_foot(key.labels)]
+           and not library.clips[key.clip].is_synthetic and SENDING & key.labels and may_use_foot(key.labels)]
     left, right = (sum(side in labels for labels in own) for side in SIDES)
     return "" if left == right else SIDES[int(left > right)]
 

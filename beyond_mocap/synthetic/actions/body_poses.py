@@ -16,6 +16,7 @@ from ...motion import quaternion
 from ...motion.motion import Motion
 from ...motion.retargeting.neutral import NeutralStance
 from ...motion.retargeting.posture import Posture, to_motion
+from ...motion.supports import GRAVITY
 from .. import gait_tables as tables
 from ..footsteps import compute_ground_lift
 from ..gait import build_posture, plan_footsteps
@@ -26,6 +27,7 @@ from ..moves import build_standing
 from .action import ActionSetting
 from .flight import apply_flight
 
+_LEAD_SECONDS, _REST_SECONDS = 1.2, 0.8  # s of running or standing before the key poses, and of standing after them
 _ROUNDING_SECONDS = 0.02  # s over which corners of the tables are rounded
 _FOOT_EASE = 0.16  # s in which a foot passes from its step to the key poses
 _PASSES = 3  # of fitting the height of a resting body, whose legs follow the hips
@@ -72,19 +74,17 @@ class BodyPoses:
     flight: tuple[float, float] | None = None
 
 
-def build_body_poses(poses: BodyPoses, setting: ActionSetting, lead: float = 1.2, rest: float = 0.8) -> Gesture:
+def build_body_poses(poses: BodyPoses, setting: ActionSetting) -> Gesture:
     """Build a movement from its key poses.
 
     Args:
         poses: the key poses.
         setting: for whom.
-        lead: s of running or standing before the key poses begin.
-        rest: s of standing after they end.
     Returns:
         The movement; it lasts from the key poses' beginning to their end.
     """
-    key = lead - poses.begin[0]
-    frames = int(round((key + poses.end + rest) * setting.fps)) + 1
+    key = _LEAD_SECONDS - poses.begin[0]
+    frames = int(round((key + poses.end + _REST_SECONDS) * setting.fps)) + 1
     times = np.arange(frames) / setting.fps - key
     run, plan = _build_run(poses, setting, times, key)
     posture = _blend_poses(poses, setting, times, run, plan)
@@ -196,12 +196,12 @@ def compute_flight(times: np.ndarray, height: np.ndarray, take_off: float, landi
 
     low, high = np.interp([take_off, landing], times, height)
     length = landing - take_off
-    rise = (high - low) / length + 0.5 * tables.GRAVITY * length
+    rise = (high - low) / length + 0.5 * GRAVITY * length
     since = times - take_off
-    free = low + rise * since - 0.5 * tables.GRAVITY * since**2
+    free = low + rise * since - 0.5 * GRAVITY * since**2
     out = np.where((times >= take_off) & (times <= landing), free, height)
     reach = min(0.25, length)
-    for edge, value, slope, sign in ((take_off, low, rise, -1.0), (landing, high, rise - tables.GRAVITY * length, 1.0)):
+    for edge, value, slope, sign in ((take_off, low, rise, -1.0), (landing, high, rise - GRAVITY * length, 1.0)):
         far = edge + sign * reach
         inside = (times - edge) * sign > 0.0
         inside &= (times - far) * sign < 0.0

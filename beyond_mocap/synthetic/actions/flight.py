@@ -9,7 +9,7 @@ from ...motion.mass import compute_centre_of_mass
 from ...motion.motion import forward_kinematics
 from ...motion.retargeting.neutral import NeutralStance
 from ...motion.retargeting.posture import Posture, to_motion
-from ..gait_tables import GRAVITY
+from ...motion.supports import GRAVITY
 
 _PUSH_SECONDS = 0.25  # s before take-off and after landing in which the legs take up the change of speed
 

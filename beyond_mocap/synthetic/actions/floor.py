@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..gait_tables import GRAVITY
+from ...motion.supports import GRAVITY
 from ..gestures import Gesture, interpolate_rows
 from .action import ActionSetting
 from .ball_hands import hold_ball

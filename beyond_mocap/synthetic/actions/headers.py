@@ -14,7 +14,7 @@ import numpy as np
 from ...base.time_series import hann_smooth
 from ...motion.humanoid import identify_joints
 from ...motion.retargeting.posture import Posture, to_motion
-from .. import gait_tables as tables
+from ...motion.supports import GRAVITY
 from ..gait import plan_footsteps, pose_upper_body
 from ..gait_legs import plant_feet
 from ..gait_plan import GaitPlan, GaitStyle, plan_gait
@@ -100,7 +100,7 @@ def build_running_header(setting: ActionSetting) -> Gesture:
 def _build_jump_in_run(setting: ActionSetting, heads: bool) -> Gesture:
     """Build a jump in a run."""
     neutral, style = setting.neutral, GaitStyle(life=0.3)
-    air = float(np.sqrt(2.0 * compute_rise(setting) / tables.GRAVITY))
+    air = float(np.sqrt(2.0 * compute_rise(setting) / GRAVITY))
     frames = int(round((_STRIDE_BEFORE + _STRIDE_AFTER) * setting.fps)) + 1
     plan = plan_gait(np.full(frames, setting.speed), None, setting.fps, neutral, style=style)
     plan = _stretch_flight(set_push(plan, _STRIDE_BEFORE - air, LEFT), _STRIDE_BEFORE, air)

@@ -30,6 +30,8 @@ from .flight import apply_flight
 from .ground import keep_above_ground, lower_hips, raise_hips
 
 Rows = tuple[tuple[float, ...], ...]
+REST_ARM = (2, 9, 12, 16, 0)
+"""Degrees of an arm that hangs: a row of arms without its time."""
 _ROUNDING_SECONDS = 0.02  # s over which corners of the tables are rounded
 _LEAST_HELD = 0.3  # s in which an action that lasts is wholly shown
 _FOOT_DOWN = 0.004  # m above the ground up to which a foot stands on it

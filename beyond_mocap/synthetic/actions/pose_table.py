@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...annotation.vocabulary import SIDES
-from ..gait_tables import GRAVITY
+from ...motion.supports import GRAVITY
 from ..gestures import Gesture
 from .action import Action, ActionSetting
 from .body_gestures import GESTURES

@@ -14,10 +14,10 @@ from ...base.errors import InputError
 from ...base.time_series import interpolate_columns
 from ...motion import quaternion
 from ...motion.motion import Motion, forward_kinematics
+from ...motion.supports import GRAVITY
 from .bent_fingers import FingerRoll, roll_ball
 from .synthetic_body import compute_size
 
-GRAVITY = 9.81  # m/s^2
 _GRIP = (0.012, 0.105, -0.036)  # m, of a left hand in a T-pose: between the fingers, on the palm's side
 _STEP = 1e-3  # s, step of flights with air drag
 

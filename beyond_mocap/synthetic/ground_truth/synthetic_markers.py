@@ -56,7 +56,6 @@ class SyntheticTrial:
         static: static trial of the same body with the same markers.
         motion: the true motion, joints named and oriented as in marker models.
         centres: (T, J, 3) m, its joints, world.
-        static_motion: the true motion of the static trial.
         markers: places of the markers on the bones.
         clean: (T, M, 3) m, true places of the trial's markers: with skin and noise, without faults.
         faults: the faults of the trial.
@@ -67,7 +66,6 @@ class SyntheticTrial:
     static: MarkerTrial
     motion: Motion
     centres: np.ndarray
-    static_motion: Motion
     markers: MarkerPlacement
     clean: np.ndarray
     faults: tuple[Fault, ...]
@@ -131,7 +129,7 @@ def build_trial(
     faulty_trial, faults_added = faults.build_trial()
     static = MarkerTrial(labels=markers.labels, positions=static_positions, fps=pose.fps, name="planted static")
     return SyntheticTrial(trial=faulty_trial, static=static, motion=truth, centres=forward_kinematics(truth)[0],
-                          static_motion=pose, markers=markers, clean=clean, faults=faults_added, ball=ball_truth)
+                          markers=markers, clean=clean, faults=faults_added, ball=ball_truth)
 
 
 def _observe_ball(ball: BallTruth, truth: Motion, noise: float, rng: np.random.Generator) -> np.ndarray:

@@ -23,21 +23,10 @@ from beyond_mocap.library.missing_actions import ACTION_PREFIX
 from beyond_mocap.motion.humanoid import estimate_stature
 from beyond_mocap.motion.track.ball_path import BallPath
 from beyond_mocap.synthesis.provenance import read_provenance
+from tests.core.report_contract import assert_contract
 
 TOP = Path(__file__).resolve().parents[3]
 DATA = TOP.parent / "shared" / "data"
-
-# keys of the report (docs/reference/report-figures.md)
-REPORT = """
-version seed fps frames duration_s seconds{load,library,search,construct,polish,total} root_error_m{mean,p95,max}
-pelvis_error_m{mean,own} keys
-skate{contact_cm_s,source_contact_cm_s,stance_mm_median,stances_over_21mm,gmd_ratio,source_gmd_ratio}
-seam_jerk_ratio{median,p95,max,share_above_real} foot_correction_m{p95} ik_miss_share pelvis_drop_m
-pelvis_surge_ratio pose_realism loop_share speed_coverage{above,below}
-annotation_similarity{all,keys,eq18_all,eq18_keys} warp_rate{min,max} ground_mm{min,support_max} warnings
-"""
-KEY = """time_s solved_time_s labels clip clip_frame time_error_s position_error_m pelvis_error_m contact_gap_m
-ball_shift_m used_instead"""
 
 
 @pytest.fixture(scope="module")
@@ -55,19 +44,6 @@ def match(tmp_path_factory, track_of):
     (folder / "empty.txt").write_text("")
     (folder / "header.txt").write_text("3 header subtle\n")  # no synthetic action shows it either
     return folder
-
-
-@pytest.fixture
-def run(capfd):
-    """run(*arguments) -> status, standard output, lines on standard error."""
-
-    def call(*arguments):
-        capfd.readouterr()
-        status = main([str(argument) for argument in arguments])
-        out, error = capfd.readouterr()
-        return status, out, error.splitlines()
-
-    return call
 
 
 @pytest.fixture
@@ -159,16 +135,6 @@ def test_everything_asked_for_is_written_and_can_be_read(synthesize, run, match,
     assert abs(key["time_error_s"]) <= 0.5 / 25
     if method == "path":
         assert report["root_error_m"]["mean"] < 0.01
-
-
-def assert_contract(report):
-    for item in REPORT.replace("\n", " ").split():
-        name, _, parts = item.rstrip("}").partition("{")
-        assert name in report, name
-        if parts:
-            assert set(parts.split(",")) <= set(report[name]), name
-    for key in report["keys"]:
-        assert set(KEY.split()) <= set(key)
 
 
 def test_what_was_written_can_be_evaluated(synthesize, run, match, clips_folder, tmp_path):

@@ -6,23 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from beyond_mocap.cli.main import main
 from beyond_mocap.cli.matching import remove_option
 from beyond_mocap.match.folder import read_state
 from tests.core.match.small_match import LIBRARY, SMALL
-
-
-@pytest.fixture
-def run(capfd):
-    """run(*arguments) -> status, standard output, lines on standard error."""
-
-    def call(*arguments):
-        capfd.readouterr()
-        status = main([str(argument) for argument in arguments])
-        out, error = capfd.readouterr()
-        return status, out, error.splitlines()
-
-    return call
 
 
 @pytest.fixture

@@ -228,7 +228,7 @@ def test_sentinels_of_an_absent_ball_are_unknown():
     cleaned, report = clean_track(Track(track.times, track.positions, ball))
     unknown = ~np.isfinite(cleaned.ball[:, 0])
     assert np.flatnonzero(unknown).tolist() == [*range(20, 40), *range(60, 90), 120]
-    assert report.ball_unknown == 51 and any("without a ball" in line for line in report.lines)
+    assert any(line.startswith("51 samples without a ball") for line in report.lines)
     sampled = sample_track(cleaned, 30)
     absent = (sampled.times > 1) & (sampled.times < 1.4)
     assert np.isfinite(sampled.ball).all() and not sampled.ball_measured[absent].any()

@@ -9,8 +9,9 @@ from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.build import build_library
 from beyond_mocap.motion.motion import place_motion
-from beyond_mocap.passes.hit_library import KINDS, HitLibrary, MatchWeights
+from beyond_mocap.passes.hit_library import HitLibrary, MatchWeights
 from beyond_mocap.passes.hits import detect_hits
+from beyond_mocap.passes.pass_scene import KINDS
 from beyond_mocap.passes.pose_distance import BoneWeights, align_poses
 from beyond_mocap.synthetic.gait import build_gait
 from beyond_mocap.synthetic.gestures import build_strike

@@ -12,11 +12,11 @@ from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.mass import compute_centre_of_mass
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
+from beyond_mocap.motion.supports import GRAVITY
 from beyond_mocap.synthesis.search.candidate_index import ACTING
 from beyond_mocap.synthetic.actions.action import ActionSetting
 from beyond_mocap.synthetic.actions.field_table import FIELD_ACTIONS
 from beyond_mocap.synthetic.actions.kick_table import KICK_ACTIONS
-from beyond_mocap.synthetic.gait_tables import GRAVITY
 
 FPS = 60.0
 ADULT = ActionSetting(skeleton=build_adult_skeleton(), fps=FPS)

@@ -12,6 +12,7 @@ from beyond_mocap.motion.mass import compute_centre_of_mass
 from beyond_mocap.motion.motion import Motion, compute_end_positions, forward_kinematics
 from beyond_mocap.motion.retargeting.adult import build_adult_skeleton
 from beyond_mocap.motion.retargeting.neutral import build_neutral_stance
+from beyond_mocap.motion.supports import GRAVITY
 from beyond_mocap.synthetic import gait_tables
 from beyond_mocap.synthetic.gait import build_gait, plan_footsteps
 from beyond_mocap.synthetic.gait_plan import GaitStyle, plan_gait
@@ -56,7 +57,7 @@ def test_the_centre_of_mass_flies_between_contacts(speed):
     motion = build_gait(speed, None if np.ndim(speed) else 4.0, FPS)
     found = flight_accelerations(motion, speed)
     assert len(found) >= 8
-    assert np.max(np.abs(found - [0.0, 0.0, -gait_tables.GRAVITY])) < 0.15
+    assert np.max(np.abs(found - [0.0, 0.0, -GRAVITY])) < 0.15
 
 
 def test_the_centre_of_mass_flies_in_a_bend():

@@ -22,6 +22,7 @@ from beyond_mocap.throws.correction import correct_motion
 from beyond_mocap.throws.foot_tilt import point_foot
 
 R = FOOTBALL.radius
+ANCHORED = Freedom(rotation=0.0, pace=0.0, start_position=False)  # position, heading and frames stay
 
 
 def one(ends, velocity, centre):
@@ -57,7 +58,7 @@ def test_a_kick_hits_another_target(lies):
     start = compute_launch(made.motion, AtFoot("right"), frame, target, FOOTBALL)[0]
     target = start + [9.0, 0.6, 0.5]
     part = AtFoot("right", start if lies else None)
-    found = correct_motion(made.motion, part, frame, target, FOOTBALL, Freedom.build_anchored())
+    found = correct_motion(made.motion, part, frame, target, FOOTBALL, ANCHORED)
     flight = simulate_flight(Launch(0.0, found.position, found.velocity, found.spin), FOOTBALL, 3.0)
     assert np.linalg.norm(find_crossing(flight, target) - target) < 0.02 and found.displacement < 0.10
     if lies:
