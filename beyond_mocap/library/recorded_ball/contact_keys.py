@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from ...annotation import ClipAnnotation
-from ...annotation.ball_contact import comes_from_hands, find_striking_part, measure_contact_gap
+from ...annotation.ball_contact import SENDING, comes_from_hands, find_striking_part, measure_contact_gap
 from ...base.errors import format_count
 from ...base.time_series import find_runs
 from ...motion.motion import Motion, compute_pose
@@ -19,14 +20,16 @@ _REACH = 0.15  # m between ball and part at a contact: a ball's marker lies on i
 _RELEASE = 0.02  # s by which a release is found too late: the hand follows the ball; a key moment so near stays
 _CHANGE_SECONDS = 0.03  # before and after a contact over which the ball's velocity is measured
 _CHANGE = 1.0  # m/s by which a contact changes the ball's velocity
+_STRIKE_SHARE = 0.5  # of the largest change near, that a strike changes the ball's velocity by at least
 _BOUNCE_HEIGHT, _BOUNCE_SHARE = 0.05, 0.4  # m above rest, and level share of the change, of a ball that only bounces
 
 
 def find_contact_frame(motion: Motion, ball: np.ndarray, row: ClipAnnotation) -> float | None:
     """Find the frame in which the part that a key moment's labels name meets the ball.
 
-    That is where the ball's velocity changes while the part is near; of a throw from the hands, where the hand is last
-    near.
+    That is where the ball's velocity changes while the part is near; of labels that send the ball, where it changes
+    about as much as anywhere near: a touch of the run-up is no kick. Of a throw from the hands it is where the hand is
+    last near.
 
     Args:
         motion: T frames.
@@ -47,8 +50,11 @@ def find_contact_frame(motion: Motion, ball: np.ndarray, row: ClipAnnotation) ->
     if comes_from_hands(row.words):
         frames = [_find_release(gap, *run) for run in find_runs(is_near) if run[1] < len(gap)]
     else:
-        frames = [frame for frame in _find_course_changes(ball[first:last], width, motion.fps)
-                  if is_near[max(0, round(frame) - width) : round(frame) + width + 1].any()]
+        changes = [change for change in _find_course_changes(ball[first:last], width, motion.fps)
+                   if is_near[max(0, round(change.frame) - width) : round(change.frame) + width + 1].any()]
+        largest = max((change.size for change in changes), default=0.0)
+        least = _STRIKE_SHARE * largest if SENDING.intersection(row.words) else 0.0
+        frames = [change.frame for change in changes if change.size >= least]
     low, high = max(row.key - reach, min(row.start, row.key)), min(row.key + reach, max(row.end, row.key))
     if row.start == row.end:  # a key moment without a span
         low, high = row.key - reach, row.key + reach
@@ -66,8 +72,15 @@ def _find_release(gap: np.ndarray, start: int, end: int) -> float:
     return float(np.clip(end - 1 - max(grown, 0.0) / max(rate, 1e-6), start, end - 1))
 
 
-def _find_course_changes(ball: np.ndarray, width: int, fps: float) -> list[float]:
-    """Find the frames, fractional, at which the ball (T, 3) m changes its velocity otherwise than by a bounce.
+class _CourseChange(NamedTuple):
+    """A change of the ball's velocity: the frame, fractional, and its size in m/s."""
+
+    frame: float
+    size: float
+
+
+def _find_course_changes(ball: np.ndarray, width: int, fps: float) -> list[_CourseChange]:
+    """Find where the ball (T, 3) m changes its velocity otherwise than by a bounce.
 
     width: frames before and after over which its velocity is measured.
     """
@@ -84,7 +97,8 @@ def _find_course_changes(ball: np.ndarray, width: int, fps: float) -> list[float
         is_low = ball[around, 2].min() <= BALL_RADIUS + _BOUNCE_HEIGHT
         is_level = np.linalg.norm(change[frame, :2]) >= _BOUNCE_SHARE * size[frame]
         if is_peak and (is_level or not is_low):
-            found.append(float(np.average(np.arange(len(ball))[around], weights=size[around])))
+            middle = float(np.average(np.arange(len(ball))[around], weights=size[around]))
+            found.append(_CourseChange(middle, float(size[frame])))
     return found
 
 

@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 
+from beyond_mocap.annotation import ClipAnnotation
 from beyond_mocap.annotation.ball_contact import build_surfaces
 from beyond_mocap.annotation.striking import trace_fastest_surface
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.files.tables import write_ball
 from beyond_mocap.library.build import build_library
+from beyond_mocap.library.recorded_ball import contact_keys
 from beyond_mocap.motion.ball_names import is_ball_name
 from beyond_mocap.motion.motion import Motion, compute_pose, sample_frames
 from beyond_mocap.motion.track import BALL_RADIUS
@@ -93,6 +95,17 @@ def test_the_planted_ball_and_its_contact_come_back(folder, kick, form):
 def test_a_library_without_a_ball_keeps_its_key_moments(folder, kick):
     clip = find_clip(build_library(folder, unit=0.01))
     assert clip.ball is None and find_key(clip) == round((kick.key + 0.1) * 60.0)
+
+
+@pytest.mark.parametrize("words, met", [("kick low inside right", 0), ("dribble right", -14)])
+def test_a_touch_of_the_run_up_is_no_kick(kick, monkeypatch, words, met):
+    monkeypatch.setattr(contact_keys, "measure_contact_gap", lambda *given: np.zeros(len(given[-1])))
+    frame = 40
+    ahead = np.maximum(np.arange(len(kick.motion)) - frame + 14, 0) * 1.5 / 60.0
+    ahead += np.maximum(np.arange(len(kick.motion)) - frame, 0) * SPEED / 60.0
+    ball = np.column_stack([ahead, 0.0 * ahead, np.full(len(ahead), BALL_RADIUS)])
+    row = ClipAnnotation(start=0.0, end=len(ball) - 1.0, key=frame - 12.0, words=tuple(words.split()))
+    assert contact_keys.find_contact_frame(kick.motion, ball, row) == pytest.approx(frame + met, abs=0.6)
 
 
 def test_a_ball_that_only_bounces_beside_the_foot_is_no_contact(folder, kick):
