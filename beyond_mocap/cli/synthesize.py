@@ -13,7 +13,7 @@ from ..base.errors import InputError, NotInLibraryError, format_count
 from ..base.memory import check_memory
 from ..base.optional_packages import import_optional
 from ..base.settings.match import OVERLAP, WINDOW
-from ..base.settings.options import add_options, name_options, option_values, parse_path
+from ..base.settings.options import add_options, describe_ignored_options, name_options, option_values, parse_path
 from .comparing import run_comparison
 from .library import check_library_options, open_library
 from .outputs import ProgressReporter, Writer, add_take_files, check_outputs, choose_writer, locate_errors
@@ -120,6 +120,8 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     take_warnings = [line for line in warnings if line not in library.notes]
     for line in (*take_warnings, *(f"{options.track}: {line}" for line in data.lines)):
         reporter.show_note(name_options(line, "synthesis"))
+    for line in describe_ignored_options(options, "synthesis", "player"):
+        reporter.show_note(line)
     if options.ball and ball is None:
         hint = "" if options.recorded_ball else "; --recorded-ball takes that of the recordings"
         hint = hint if any(clip.ball is not None for clip in library.clips) else ""
