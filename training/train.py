@@ -152,8 +152,8 @@ def choose_epochs(
     """
     if not held:
         few = "there is no second subject to hold out, to see how many epochs help other people"
-        linear, every = EpochChoice(0, f"the linear start alone: {few}"), EpochChoice(config.epochs, f"all epochs: {few}")
-        return (linear if config.linear_start else every), 0.0
+        count, name = (0, "the linear start alone") if config.linear_start else (config.epochs, "all epochs")
+        return EpochChoice(count, f"{name}: {few}"), 0.0
     tested, kept = _select_tested(held), problem.without_held_out()
     start = build_model(kept.build_parameters(jax.random.key(config.seed)), "")
     epochs, errors = [0], [_measure_errors(start, tested, cancelled)]
