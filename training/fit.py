@@ -110,10 +110,11 @@ class TrainingResult:
     Attributes:
         params: parameters, as the problem defines them.
         epochs: number of epochs.
-        seconds: computing time.
+        seconds: training time, without compiling.
         losses: mean loss of each epoch.
         parts: parts of the loss in the last epoch, by name.
         line: why it has that number of epochs.
+        is_out_of_time: whether the time limit ended it.
     """
 
     params: dict
@@ -122,6 +123,7 @@ class TrainingResult:
     losses: tuple[float, ...]
     parts: dict[str, float]
     line: str = ""
+    is_out_of_time: bool = False
 
 
 def fit(
@@ -138,12 +140,13 @@ def fit(
         config: configuration of the training.
         checkpoint: file to write after each macro-epoch and when cancelled, or None.
         resume: continue from the checkpoint.
-        minutes: time limit, or None.
+        minutes: time limit of the training, or None; compiling is not counted, and the first epoch is always trained.
         choice: epochs after which it ends, while the learning rate falls as for `config.epochs`; None for all of
             these. A checkpoint that is resumed contains it.
-        is_done: receives parameters and epochs after each macro-epoch and the last epoch, and returns True to end.
+        is_done: receives parameters and epochs after each macro-epoch and the last epoch, also where time ends, and
+            returns True to end.
         progress: receives a share of 0 .. 1 and a text.
-        cancelled: returns True to stop.
+        cancelled: returns True to stop; asked between batches. A step that compiles ends first.
     Raises:
         InputError: if no example is long enough, the checkpoint is of another training, or the loss is not finite.
         UserCancelledError: if `cancelled` returns True.
@@ -157,32 +160,39 @@ def fit(
         state, epoch, earlier_seconds, losses = previous.state, previous.epoch, previous.seconds, previous.losses
         choice = previous.choice
     start_time = time.perf_counter() - earlier_seconds
-    steps, parts = _compile_step(problem, adam), {}
+    step, parts, choice = CompiledStep(problem, adam), {}, choice or EpochChoice(config.epochs)
+
+    def measure_seconds() -> float:
+        return time.perf_counter() - start_time - step.seconds
 
     def save_checkpoint() -> None:
         if checkpoint is not None:
-            seconds = time.perf_counter() - start_time
-            write_checkpoint(checkpoint, Checkpoint(state, epoch, seconds, losses, problem.fits, choice))
+            write_checkpoint(checkpoint, Checkpoint(state, epoch, measure_seconds(), losses, problem.fits, choice))
 
-    choice = choice or EpochChoice(config.epochs)
-    while epoch < choice.epochs and (
-        share := _compute_share(epoch, time.perf_counter() - start_time, config, minutes)
-    ) < 1.0:
-        progress(share, f"epoch {epoch + 1}, loss {losses[-1]:.4f}" if losses else "compiling")
+    def check_cancelled() -> None:
         if cancelled():
             save_checkpoint()
             raise UserCancelledError(f"cancelled after {epoch} epochs" + ("; --resume continues" if checkpoint else ""))
-        state, parts = _train_epoch(problem, config, steps, state, epoch, problem.count_frames(share),
-                                    compute_rate(share, config))
+
+    def compute_share() -> float:
+        return _compute_share(epoch, measure_seconds(), config, minutes)
+
+    share, is_stopped = compute_share(), False
+    while epoch < choice.epochs and share < 1.0 and not is_stopped:
+        progress(share, f"epoch {epoch + 1}, loss {losses[-1]:.4f}" if losses else "compiling")
+        check_cancelled()
+        state, parts = _train_epoch(problem, config, step, state, epoch, share, check_cancelled)
         losses, epoch = (*losses, parts["loss"]), epoch + 1
         if not np.isfinite(losses[-1]):
             raise InputError("training", f"the loss is not finite after {epoch} epochs", "a lower learning_rate")
-        if epoch % config.macro == 0 or epoch == choice.epochs:
+        share = compute_share()
+        if epoch % config.macro == 0 or epoch == choice.epochs or share >= 1.0:
             save_checkpoint()
-            if is_done(jax.tree.map(np.array, state[0]), epoch):
-                break
+            is_stopped = is_done(jax.tree.map(np.array, state[0]), epoch)
+    check_cancelled()
     save_checkpoint()
-    return TrainingResult(state[0], epoch, time.perf_counter() - start_time, losses, parts, choice.line)
+    return TrainingResult(state[0], epoch, measure_seconds(), losses, parts, choice.line,
+                          epoch < choice.epochs and not is_stopped)
 
 
 def compute_rate(share: float, config: TrainingConfig) -> float:
@@ -197,7 +207,7 @@ def compute_rate(share: float, config: TrainingConfig) -> float:
 def _compute_share(epoch: int, seconds: float, config: TrainingConfig, minutes: float | None) -> float:
     """Compute the share of the training that is done, by epochs or by time, whichever is larger."""
     done = epoch / config.epochs if config.epochs else 1.0
-    return max(done, 0.0 if minutes is None else seconds / (60.0 * minutes))
+    return max(done, 0.0 if minutes is None or not epoch else seconds / (60.0 * minutes))
 
 
 def _build_clipping() -> optax.GradientTransformation:
@@ -213,23 +223,43 @@ def _build_clipping() -> optax.GradientTransformation:
     return optax.GradientTransformation(lambda params: optax.EmptyState(), update)
 
 
-def _compile_step(problem: Problem, adam):
-    """Build the compiled step, one for each number of frames."""
+class CompiledStep:
+    """A step of the optimizer, compiled once for each number of frames that are fed back.
 
-    @partial(jax.jit, static_argnames="frames", donate_argnums=0)
-    def step(state, data, rows, key, rate, frames: int):
-        params, optimizer = state
-        (loss, parts), gradient = jax.value_and_grad(problem.compute_loss, has_aux=True)(params, data, rows, key,
-                frames)
-        updates, optimizer = adam.update(gradient, optimizer, params)
-        params = jax.tree.map(lambda p, u: p - rate * u, params, updates)
-        return (params, optimizer), {"loss": loss, **parts}
+    Attributes:
+        seconds: time that compiling took so far.
+    """
 
-    return step
+    def __init__(self, problem: Problem, adam: optax.GradientTransformation):
+        """Prepare the step of a problem; nothing is compiled yet.
+
+        Args:
+            problem: the problem.
+            adam: the optimizer.
+        """
+        @partial(jax.jit, static_argnames="frames")
+        def step(state, data, rows, key, rate, frames: int):
+            params, optimizer = state
+            (loss, parts), gradient = jax.value_and_grad(problem.compute_loss, has_aux=True)(params, data, rows, key,
+                                                                                           frames)
+            updates, optimizer = adam.update(gradient, optimizer, params)
+            params = jax.tree.map(lambda p, u: p - rate * u, params, updates)
+            return (params, optimizer), {"loss": loss, **parts}
+
+        self.seconds, self._step, self._compiled = 0.0, step, {}
+
+    def run(self, frames: int, *arguments):
+        """Run the step on state, data, rows, key and rate: the new state, and the parts of the loss."""
+        if frames not in self._compiled:
+            start_time = time.perf_counter()
+            self._compiled[frames] = self._step.lower(*arguments, frames=frames).compile()
+            self.seconds += time.perf_counter() - start_time
+        return self._compiled[frames](*arguments)
 
 
-def _train_epoch(problem, config, step, state, epoch, frames, rate):
-    """Train one epoch: the new state, and the mean of the losses."""
+def _train_epoch(problem, config, step: CompiledStep, state, epoch, share, check_cancelled):
+    """Train one epoch: the new state, and the mean of the losses. A cancelled one leaves the state as it was."""
+    frames, rate = problem.count_frames(share), compute_rate(share, config)
     length = max(1, frames)
     rows = list_stretches(problem.lengths, length, config.seed, epoch)
     if not len(rows):
@@ -238,9 +268,9 @@ def _train_epoch(problem, config, step, state, epoch, frames, rate):
     losses = []
     for number, batch in enumerate(split_batches(rows, max(1, config.batch // length))):
         one = jax.random.fold_in(key, number)
-        state, parts = step(state, problem.data, jnp.asarray(batch), one, jnp.float32(rate), frames=frames)
-        losses.append(parts)
-    losses = jax.device_get(losses)
+        state, parts = step.run(frames, state, problem.data, jnp.asarray(batch), one, jnp.float32(rate))
+        losses.append(jax.device_get(parts))
+        check_cancelled()
     return state, {name: float(np.mean([parts[name] for parts in losses])) for name in losses[0]}
 
 
@@ -251,7 +281,7 @@ class Checkpoint:
     Attributes:
         state: parameters and optimizer's state, a tree of arrays.
         epoch: number of epochs done.
-        seconds: computing time so far.
+        seconds: training time so far, without compiling.
         losses: (E,) mean loss of each epoch.
         fits: settings and recordings as one text to compare.
         choice: epochs after which the training ends.

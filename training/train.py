@@ -44,9 +44,10 @@ from .recordings import build_recordings
 _HOLD_OUT_STEP = 4  # every fourth movement of a single subject is held out
 _MAX_TESTED = 8  # movements that are generated for each ridge
 _TOLERANCE = 1.05  # errors up to this multiple of the lowest count as equal; the largest ridge of those is the safest
+_LEAST_MINUTES = 1e-3  # left to the training itself, where choosing the number of epochs took longer than it had
 READING_SHARE = 0.05
 """Share of the progress for reading the folder."""
-_CHOOSING_SHARE = 0.4  # share of progress and time for choosing the number of epochs
+_CHOOSING_SHARE = 0.4  # share of progress and time for choosing the number of epochs; the time it leaves is used, too
 
 
 def train(
@@ -61,7 +62,7 @@ def train(
         config: configuration of the training.
         checkpoint: file of the checkpoint, used by `resume`, or None.
         resume: continue from the checkpoint.
-        minutes: time limit, or None.
+        minutes: time limit of the epochs, or None; the start and compiling are not counted.
         is_done: receives the epochs after each macro-epoch, and returns True to end with the model as it is then;
             `resume` continues from there.
         progress: receives a share of 0 .. 1 and a text.
@@ -97,18 +98,21 @@ def train(
     if config.linear_start and not config.ridge:
         progress(0.0, "choosing the start")
         problem.ridge = choose_ridge(problem, held, build_model, cancelled)
-    choice, share = None, 0.0
+    choice, share, used = None, 0.0, 0.0
     if config.early_stopping and config.epochs and not resume:
         share = _CHOOSING_SHARE
         others = held if len({example.subject for example in examples}) > 1 else []
-        choice = choose_epochs(problem, config, others, build_model, minutes and share * minutes,
-                               lambda done, text: progress(share * done, f"held out: {text}"), cancelled)
+        choice, used = choose_epochs(problem, config, others, build_model, minutes=minutes and share * minutes,
+                                     progress=lambda done, text: progress(share * done, f"held out: {text}"),
+                                     cancelled=cancelled)
     trained = fit(
-        problem, config, checkpoint=checkpoint, resume=resume, minutes=minutes and (1.0 - share) * minutes,
+        problem, config, checkpoint=checkpoint, resume=resume,
+        minutes=minutes and max(minutes - used / 60.0, _LEAST_MINUTES),
         choice=choice, is_done=lambda params, epoch: is_done(epoch),
         progress=lambda done, text: progress(share + (1.0 - share) * done, text), cancelled=cancelled,
     )
-    notes = (*notes, trained.line) if trained.line else notes
+    late = f"the time limit ended the training after {trained.epochs} epochs" if trained.is_out_of_time else ""
+    notes = (*notes, *(line for line in (trained.line, late) if line))
     return build_model(trained.params, _describe_training(examples, trained))
 
 
@@ -129,9 +133,9 @@ def widen_units(config: TrainingConfig, chains: Chains) -> tuple[TrainingConfig,
 
 def choose_epochs(
     problem: TrainingProblem, config: TrainingConfig, held: Sequence[Example],
-    build_model: Callable[[dict, str], ThrowModel], minutes: float | None,
+    build_model: Callable[[dict, str], ThrowModel], *, minutes: float | None,
     progress: Callable[[float, str], None] = lambda share, text: None, cancelled: Callable[[], bool] = lambda: False,
-) -> EpochChoice:
+) -> tuple[EpochChoice, float]:
     """Choose the number of epochs by training without the held out examples until they no longer improve.
 
     Args:
@@ -143,26 +147,31 @@ def choose_epochs(
         minutes: time limit, or None.
         progress: receives a share of 0 .. 1 and a text.
         cancelled: returns True to stop.
+    Returns:
+        The choice, and the seconds of training that it took.
     """
     if not held:
         few = "there is no second subject to hold out, to see how many epochs help other people"
-        return EpochChoice(0, f"the linear start alone: {few}") if config.linear_start else EpochChoice(config.epochs,
-                f"all epochs: {few}")
+        count, name = (0, "the linear start alone") if config.linear_start else (config.epochs, "all epochs")
+        return EpochChoice(count, f"{name}: {few}"), 0.0
     tested, kept = _select_tested(held), problem.without_held_out()
     start = build_model(kept.build_parameters(jax.random.key(config.seed)), "")
-    epochs, errors = [0], [_measure_errors(start, tested)]
+    epochs, errors = [0], [_measure_errors(start, tested, cancelled)]
 
     def is_done(params: dict, epoch: int) -> bool:
         epochs.append(epoch)
-        errors.append(_measure_errors(build_model(params, ""), tested))
+        errors.append(_measure_errors(build_model(params, ""), tested, cancelled))
         return len(errors) - 1 - int(np.argmin(errors)) >= config.patience
 
-    fit(kept, config, minutes=minutes, is_done=is_done, progress=progress, cancelled=cancelled)
+    tried = fit(kept, config, minutes=minutes, is_done=is_done, progress=progress, cancelled=cancelled)
     best = int(np.argmin(errors))
     who = ", ".join(dict.fromkeys(example.subject for example in held))
-    return EpochChoice(epochs[best] or (0 if config.linear_start else config.epochs), (
-        f"{epochs[best]} of {config.epochs} epochs: held out to choose that, {len(tested)} movements of {who}, hands "
-        f"and feet {100 * errors[0]:.2f} cm off before and {100 * errors[best]:.2f} cm after, networks alone"))
+    late = f" (the time limit ended the choice after {epochs[-1]})" if tried.is_out_of_time else ""
+    chosen = epochs[best] or (0 if config.linear_start else config.epochs)
+    return EpochChoice(chosen, (
+        f"{chosen} of {config.epochs} epochs{late}: held out to choose that, {len(tested)} movements of {who}, "
+        f"hands and feet {100 * errors[0]:.2f} cm off without epochs and {100 * min(errors[1:]):.2f} cm with "
+        f"{epochs[1 + int(np.argmin(errors[1:]))]}, networks alone")), tried.seconds
 
 
 def select_spread(examples: Sequence[Example], most: int, all_subjects: bool = True) -> list[Example]:
@@ -255,10 +264,8 @@ def choose_ridge(
     tested = _select_tested(held)
     errors = []
     for ridge in RIDGES:
-        if cancelled():
-            raise UserCancelledError("cancelled while choosing the start")
         model = build_model(problem.build_weights(jax.random.key(0), problem.fit_linear(ridge, use_held_out=False)), "")
-        errors.append(_measure_errors(model, tested))
+        errors.append(_measure_errors(model, tested, cancelled))
     good = [ridge for ridge, one in zip(RIDGES, errors) if one <= _TOLERANCE * min(errors)]
     return good[-1] if good else RIDGES[-1]
 
@@ -268,9 +275,14 @@ def _select_tested(held: Sequence[Example]) -> list[Example]:
     return [held[i] for i in np.unique(np.linspace(0, len(held) - 1, _MAX_TESTED).round().astype(int))]
 
 
-def _measure_errors(model: ThrowModel, examples: Sequence[Example]) -> float:
-    """Measure the mean of `_measure_error` over examples."""
-    return float(np.mean([_measure_error(model, example) for example in examples]))
+def _measure_errors(model: ThrowModel, examples: Sequence[Example], cancelled: Callable[[], bool]) -> float:
+    """Measure the mean of `_measure_error` over examples; UserCancelledError if `cancelled` returns True."""
+    errors = []
+    for example in examples:
+        if cancelled():
+            raise UserCancelledError("cancelled before the training on all examples; it begins again")
+        errors.append(_measure_error(model, example))
+    return float(np.mean(errors))
 
 
 def _measure_error(model: ThrowModel, example: Example) -> float:

@@ -14,7 +14,7 @@ from ..base.errors import InputError, NotInLibraryError, format_count
 from ..base.memory import check_memory
 from ..base.optional_packages import import_optional
 from ..base.settings.match import OVERLAP, WINDOW
-from ..base.settings.options import add_options, name_options, option_values, parse_path
+from ..base.settings.options import add_options, describe_ignored_options, name_options, option_values, parse_path
 from .comparing import run_comparison
 from .library import check_library_options, open_library
 from .outputs import ProgressReporter, Writer, add_take_files, check_outputs, choose_writer, locate_errors
@@ -112,7 +112,8 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     messages = [*(line for line in warnings if line not in library.notes),
                 *(f"{options.track}: {line}" for line in data.lines)]
     for line in (*_describe_inputs(options, library, annotations),
-                 *(name_options(line, "synthesis") for line in messages)):
+                 *(name_options(line, "synthesis") for line in messages),
+                 *describe_ignored_options(options, "synthesis", "player")):
         reporter.show_note(line)
     if options.ball and ball is None:
         reporter.show_note(_describe_missing_ball(options, library))

@@ -98,7 +98,8 @@ def measure_foot_slide(motion: Motion) -> dict | None:
     toes = measure_contact_speeds(feet[:, :, 1:], points[..., 1], motion.fps)
     return {"contact_cm_s": _compute_mean(100.0 * measure_contact_speeds(feet, contacts, motion.fps)),
             "toe_cm_s": _compute_mean(100.0 * toes),
-            "stance_mm_median": float(np.median(travel)) if len(travel) else None, "stances": len(travel)}
+            "stance_mm_median": float(np.median(travel)) if len(travel) else None, "stances": len(travel),
+            "stances_over_25mm": int(np.count_nonzero(travel > _VISIBLE_TRAVEL))}
 
 
 def describe_foot_slide(motion: Motion, is_planted: bool) -> list[str]:
@@ -114,8 +115,13 @@ def describe_foot_slide(motion: Motion, is_planted: bool) -> list[str]:
     speed, travel = slide.get("toe_cm_s") or 0.0, slide.get("stance_mm_median") or 0.0
     if speed <= _VISIBLE_TOE_SPEED and travel <= _VISIBLE_TRAVEL:
         return []
-    advice = "their markers move further than foot planting holds; check them" if is_planted else "use Plant Feet"
-    return [f"standing toes slide {travel:.0f} mm in a stance, {speed:.0f} cm/s: {advice}"]
+    found = f"standing toes slide {travel:.0f} mm in the median stance, {speed:.0f} cm/s on average"
+    if not is_planted:
+        return [f"{found}: use Plant Feet"]
+    held, far = f"the {_VISIBLE_TRAVEL:.0f} mm that foot planting holds", slide["stances_over_25mm"]
+    if not far:
+        return [f"{found}: no stance moves further than {held}; the contacts are short and fast, as in a sprint"]
+    return [f"{found}: {far} of {slide['stances']} stances move further than {held}; check their markers"]
 
 
 def measure_limit_shares(solved, names) -> dict[str, float]:

@@ -37,6 +37,7 @@ from .throw_request import KINDS, ThrowRequest, ThrowResult, build_ball_path, bu
 _MAX_BALL_HEIGHT = 0.25  # share of the stature: largest height above the ground of a ball that is kicked
 STATURE_RANGE = (0.1, 10.0)
 """Range of the stature, m, of a body that throws."""
+_WARN_SPEED_ERROR = 0.05  # share of the requested speed by which the ball's may differ without a warning
 _WARN_LIMIT_EXCESS = np.radians(2.0)  # excess over joint limits that is reported
 _MAX_DISPLACEMENT, _MAX_MISS = 0.15, 1.0
 """m: largest displacement of wrist or ankle and largest miss with which a throw is returned."""
@@ -269,7 +270,7 @@ class _ThrowGenerator:
                 f"the ball leaves at {speed:.0f} m/s, above the human limit of {self.max_speed:.0f}: a body of "
                 f"{estimate_stature(self.skeleton):.1f} m moves faster"
             )
-        if self.request.speed and abs(speed - self.request.speed) > 0.1 * self.request.speed:
+        if self.request.speed and abs(speed - self.request.speed) > _WARN_SPEED_ERROR * self.request.speed:
             self.warnings.append(f"the ball leaves at {speed:.1f} m/s instead of {self.request.speed:.1f}")
 
 

@@ -156,7 +156,7 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
     def list_tuning(self) -> list[str]:
         """List the names of the settings under Fine Tuning."""
         return [row.identifier for row in list_settings("synthesis")
-                if row.tuning == "any" or self.method in row.tuning.split()]
+                if row.tuning and row.is_used_by(self.method)]
 
 
 class BeyondMocapWork(bpy.types.PropertyGroup):

@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +15,7 @@ import pytest
 
 from beyond_mocap.base.errors import InputError, UserCancelledError
 from training.config import build_config
-from training.fit import build_checkpoint_path, compute_rate, fit, list_stretches, split_batches
+from training.fit import EpochChoice, build_checkpoint_path, compute_rate, fit, list_stretches, split_batches
 
 TOP = Path(__file__).resolve().parents[2]
 CONFIG = build_config({"epochs": 12, "macro": 3, "batch": 16, "learning_rate": 0.05, "final_rate": 0.01, "seed": 3})
@@ -76,16 +77,23 @@ fit(Line(), CONFIG, checkpoint=Path({str(path)!r}), progress=progress)
     assert bits(resumed) == bits(whole) and resumed.losses == whole.losses and resumed.epochs == 12
 
 
-def test_cancelled_keeps_what_stands(tmp_path):
+@pytest.mark.parametrize("most", [5, 6, 9])
+def test_cancelled_keeps_whole_epochs(tmp_path, most):
+    """An epoch asks once before and after each of its batches; one that is cancelled within is trained again."""
     path, asked = tmp_path / "w.checkpoint.npz", []
 
     def cancelled():
         asked.append(1)
-        return len(asked) > 4
+        return len(asked) > most
 
-    with pytest.raises(UserCancelledError, match="4 epochs"):
+    with pytest.raises(UserCancelledError, match="1 epochs"):
         fit(Line(), CONFIG, checkpoint=path, cancelled=cancelled)
     assert bits(fit(Line(), CONFIG, checkpoint=path, resume=True)) == bits(fit(Line(), CONFIG))
+
+
+def test_cancelled_without_an_epoch_to_train():
+    with pytest.raises(UserCancelledError):
+        fit(Line(), CONFIG, choice=EpochChoice(0), cancelled=lambda: True)
 
 
 @pytest.mark.parametrize("harm", ["cut", "empty", "text", "missing", "other"])
@@ -105,9 +113,23 @@ def test_a_bad_checkpoint_is_one_line(tmp_path, harm):
     assert len(str(error.value).splitlines()) == 1
 
 
-def test_a_limit_of_time_ends_it():
-    trained = fit(Line(), replace(CONFIG, epochs=100_000), minutes=0.01)
-    assert 0 < trained.epochs < 100_000 and trained.seconds < 30
+class SlowToCompile(Line):
+    """The line, whose step takes 0.7 s longer to compile."""
+
+    def compute_loss(self, *arguments):
+        time.sleep(0.7)  # runs when the step is traced, never in an epoch
+        return super().compute_loss(*arguments)
+
+
+def test_a_limit_of_time_counts_epochs_and_not_compiling():
+    measured, config = [], replace(CONFIG, epochs=100_000, macro=10_000)
+    trained = fit(SlowToCompile(), config, minutes=0.01, is_done=lambda params, epoch: measured.append(epoch))
+    assert 1 < trained.epochs < 100_000 and trained.is_out_of_time and 0.6 <= trained.seconds < 30
+    assert measured == [trained.epochs]
+
+
+def test_the_first_epoch_is_trained_in_any_time():
+    assert fit(Line(), CONFIG, minutes=1e-9).epochs == 1
 
 
 def test_the_rate_falls():

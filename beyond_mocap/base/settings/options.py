@@ -59,6 +59,22 @@ def name_options(line: str, *groups: str) -> str:
     return line
 
 
+def describe_ignored_options(options: argparse.Namespace, *groups: str) -> list[str]:
+    """Describe the options that are set although the chosen method of synthesis does not use them.
+
+    Args:
+        options: the parsed command line, with `method`.
+        groups: keys of the settings table.
+    Returns:
+        One line for each of them.
+    """
+    rows = [row for group in groups for row in list_settings(group) if row.option]
+    return [f"{row.option.split()[0]}: the method {options.method} does not use it; ignored; use it with "
+            f"{' or '.join(row.methods.split())}"
+            for row in rows if not row.is_used_by(options.method)
+            and getattr(options, row.name) != _build_arguments(row)["default"]]
+
+
 def _build_arguments(row: Setting) -> dict:
     """Build the arguments of `add_argument` for a setting."""
     more = {name: value for name, value in row.option_more.items() if name not in ("least", "most")}

@@ -59,7 +59,8 @@ class Setting:
         precision: decimals in a panel.
         panel_more: further arguments of the bpy property, and `default`, `min`, `max` where they differ there.
         in_preset: whether presets store it.
-        tuning: the methods under whose Fine Tuning the panel lists it, with blanks; "any": under each; "" for none.
+        methods: the methods of synthesis that use it, with blanks; "" for all.
+        tuning: whether the panel lists it under Fine Tuning, for these methods.
         blank: the choice that is "" in code.
         convert: converts the user's value to the value that code reads.
     """
@@ -82,7 +83,8 @@ class Setting:
     precision: int | None = None
     panel_more: Mapping = field(default_factory=dict)
     in_preset: bool = False
-    tuning: str = ""
+    methods: str = ""
+    tuning: bool = False
     blank: str | None = None
     convert: Callable | None = None
 
@@ -95,6 +97,10 @@ class Setting:
     def choice_names(self) -> tuple[str, ...]:
         """The identifiers of the choices."""
         return tuple(choice if isinstance(choice, str) else choice[0] for choice in self.choices)
+
+    def is_used_by(self, method: str) -> bool:
+        """Return whether a method of synthesis uses it."""
+        return not self.methods or method in self.methods.split()
 
     def describe_limits(self, least: float, most: float) -> str:
         """Describe the expected range of a number.

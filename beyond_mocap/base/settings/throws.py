@@ -56,7 +56,7 @@ TABLES = {
         Setting(name="seed", kind=int, least=0, most=2**31 - 1, option="--seed", help="seed of initial weights, "
                 "batches and dropout; default: the config's, else 0"),
         Setting(name="minutes", kind=float, least=0.01, most=1e5, unit="minutes", option="--minutes", metavar="M",
-                help="stop after this time and write the current weights"),
+                help="end the epochs after this time, in which compiling does not count, and write the weights"),
         Setting(name="epochs", kind=int, least=0, most=1000000, option="--epochs", metavar="N",
                 help="passes through the examples at most; default: the config's, else 30; 0: the linear start alone"),
         Setting(name="half", default=False, option="--half", help="store the weights in 16 bits"),

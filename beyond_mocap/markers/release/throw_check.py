@@ -31,7 +31,6 @@ MAX_DESCENT = np.radians(60.0)  # rad below the horizon at which a throwing hand
 _NEARBY_SECONDS = 2.0  # s before and after, in which hands are compared; a stride of a slow walk takes 1.3 s
 _SWING_SECONDS = (-0.4, 0.6)  # s around the fastest time that belong to the swing: wind-up, and follow-through
 _FAST_SHARE = 0.95  # share of the maximum speed, from which on the hand's direction counts
-_NEXT_STEP = "choose another trial, cut it to the throw, or choose the hand"
 
 
 def check_throw(hand: Hand, others: Sequence[Hand], hips: np.ndarray, name: str) -> None:
@@ -39,7 +38,7 @@ def check_throw(hand: Hand, others: Sequence[Hand], hips: np.ndarray, name: str)
 
     Args:
         hand: the hand that seems to throw, T frames.
-        others: hands that must be slower, T frames each.
+        others: hands that must be slower, T frames each; none where the user has chosen the hand.
         hips: (T, 3) metres, in the hands' space without their shift.
         name: of the trial.
     Raises:
@@ -49,7 +48,7 @@ def check_throw(hand: Hand, others: Sequence[Hand], hips: np.ndarray, name: str)
     peak = int(np.argmax(speeds))
     if speeds[peak] < MIN_SPEED:
         raise InputError(name, f"a {hand.side} hand of at most {speeds[peak]:.1f} m/s relative to the hips", "a throw",
-                         "choose another trial, or the other hand")
+                         "choose another trial" if others else "choose another trial, or the other hand")
     seconds = hand.times - hand.times[peak]
     is_near = np.abs(seconds) < _NEARBY_SECONDS
     is_swing = (seconds > _SWING_SECONDS[0]) & (seconds < _SWING_SECONDS[1])
@@ -72,7 +71,9 @@ def _check_rest(other: Hand, rest: np.ndarray, hand: Hand, speeds: np.ndarray, n
     if rest[frame] > MAX_OTHER_SHARE * speeds[peak]:
         found = (f"a {hand.side} hand of {speeds[peak]:.1f} m/s relative to the hips at {hand.times[peak]:.3f} s, and "
                  f"a {other.side} hand of {rest[frame]:.1f} m/s at {other.times[frame]:.3f} s, as in a run or a jump")
-        raise InputError(name, found, "a throw, whose hand is twice as fast as hands are otherwise", _NEXT_STEP)
+        which = "the other hand" if other is hand else "the hand"
+        raise InputError(name, found, "a throw, whose hand is twice as fast as hands are otherwise",
+                         f"choose another trial, cut it to the throw, or choose {which}")
 
 
 def _measure_descent(hand: Hand, hips: np.ndarray, speeds: np.ndarray, peak: int) -> float:

@@ -11,7 +11,7 @@ from beyond_mocap.ball.physics import THROWN_BALLS
 from beyond_mocap.base import settings
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.base.settings import TABLES, find_setting
-from beyond_mocap.base.settings.options import name_options, option_values
+from beyond_mocap.base.settings.options import describe_ignored_options, name_options, option_values
 from beyond_mocap.base.settings.setting import Setting, check_limits
 from beyond_mocap.cli.main import build_parser
 from beyond_mocap.motion.mass import SEGMENT_MASSES
@@ -104,6 +104,20 @@ def test_a_row_is_an_option_with_its_default_and_limits(with_sharpness):
 ])
 def test_messages_name_settings_as_the_command_line_does(line, group, named):
     assert name_options(line, group) == named
+
+
+@pytest.mark.parametrize("line, ignored", [
+    ("--method path --max-blocks 50 --delta 3 --catch-up-window 1 --watch 0", ["--delta", "--catch-up-window",
+                                                                               "--max-blocks"]),
+    ("--method fs --no-catch-up --max-blocks 50", ["--no-catch-up"]),
+    ("--method distance --no-catch-up --max-blocks 50 --no-made --strength 3", ["--no-made", "--strength"]),
+    ("--method baseline --delta 0.5 --strong-foot left", ["--strong-foot"]), ("", []),
+])
+def test_options_that_the_method_ignores_are_told(line, ignored):
+    options = build_parser().parse_args(["synthesize", *FILES, *line.split()])
+    told = describe_ignored_options(options, "synthesis", "player")
+    assert [one.split(":")[0] for one in told] == ignored
+    assert all(f"the method {options.method} does not use it; ignored; use it with " in one for one in told)
 
 
 def test_a_row_is_on_the_page_of_settings(with_sharpness):

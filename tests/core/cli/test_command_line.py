@@ -675,11 +675,12 @@ def test_headings_are_planned_and_written_with_the_provenance(synthesize, tmp_pa
 @pytest.mark.parametrize("method, title", [("distance", "Distance"), ("blocks", "Blocks"), ("path", None)])
 def test_headings_of_a_method_that_plans_none_are_told(synthesize, tmp_path, method, title):
     (tmp_path / "headings.csv").write_text("time_s,heading_deg\n2,120\n99,0\n")
-    status, _, error = synthesize(headings=tmp_path / "headings.csv", method=method)
+    status, _, error = synthesize(headings=tmp_path / "headings.csv", method=method, delta=0.7)
     told = [line for line in error if "heading key" in line]
     assert status == 0 and len(told) == 1
     assert (f"2 heading keys: the method {title} plans no heading" in told[0]) == bool(title)
     assert "ignored" in told[0]
+    assert any(line.startswith("note: --delta: the method") for line in error) == (method != "distance")
 
 
 def test_a_missing_package_of_the_core_is_told_in_one_line():

@@ -7,7 +7,7 @@ from beyond_mocap.base.errors import InputError
 from beyond_mocap.cli.main import main
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.markers.files.trc import write_trc
-from beyond_mocap.markers.release.release import estimate_release
+from beyond_mocap.markers.release.release import ReleaseSettings, estimate_release
 from beyond_mocap.markers.release.throw_check import check_throw
 from beyond_mocap.motion.hand import Hand
 from beyond_mocap.synthetic.gait import build_gait
@@ -26,11 +26,14 @@ def build_swing(speed, descent, seconds=2.0):
                 finger=np.array([0.0, -1.0, 0.0]), reach=0.18, elbow=origin - [0.0, 0.25, 0.0])
 
 
-@pytest.mark.parametrize("speed", [1.4, 3.5, 7.0])
-def test_a_gait_is_no_throw(speed):
+@pytest.mark.parametrize("speed, hand, step", [
+    (1.4, None, "choose the .*hand"), (3.5, None, "choose the .*hand"), (7.0, "left", "choose the other hand"),
+])
+def test_a_gait_is_no_throw(speed, hand, step):
+    """The next step is never to choose the hand that was chosen."""
     known = build_trial(build_gait(speed, 2.0, FPS), "driveline")
-    with pytest.raises(InputError, match="as in a run|at most"):
-        estimate_release(known.trial, known.motion)
+    with pytest.raises(InputError, match=f"as in a run.*, or {step}$"):
+        estimate_release(known.trial, known.motion, ReleaseSettings(hand=hand))
 
 
 def test_half_a_stride_is_no_throw():
@@ -56,15 +59,16 @@ def test_a_hand_that_is_fastest_downwards_holds_a_racquet():
 
 def test_a_hand_that_the_body_carries_does_not_throw():
     swing = build_swing(9.0, 0.0)
-    with pytest.raises(InputError, match="at most 0.0 m/s relative to the hips"):
-        check_throw(swing, (), swing.origin, "slide")
+    for others, step in (((), "choose another trial, or the other hand"), ((swing,), "choose another trial")):
+        with pytest.raises(InputError, match=f"at most 0.0 m/s relative to the hips; expected a throw; {step}$"):
+            check_throw(swing, others, swing.origin, "slide")
 
 
 def test_a_chosen_hand_is_compared_with_itself_alone():
     """Both hands of a two-handed throw are equally fast; the user may say that one of them throws."""
     swing = build_swing(5.0, 0.3)
-    with pytest.raises(InputError, match="as in a run"):
-        check_throw(swing, (swing,), np.zeros((400, 3)), "pass")
+    with pytest.raises(InputError, match="as in a run.*choose the hand"):
+        check_throw(swing, (build_swing(5.0, 0.3),), np.zeros((400, 3)), "pass")
     check_throw(swing, (), np.zeros((400, 3)), "pass")
 
 

@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 
 TOP = Path(__file__).resolve().parents[4]
-ROW = """        Setting(name="walking_cost", default=0.0, least=0.0, most=10.0, option="--walking-cost", tuning="path",
-            help="of missed speed that a walking clip costs", tooltip="Costs of walking"),
+ROW = """        Setting(name="walking_cost", default=0.0, least=0.0, most=10.0, option="--walking-cost",
+            methods="path", help="of missed speed that a walking clip costs", tooltip="Costs of walking"),
 """
 TERM = """        walks = self.index.shows_labels(frozenset(("walking",)))[frame]
         yield "walking_cost", np.float32(self.request.plan.walking_cost) * walks
