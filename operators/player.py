@@ -274,8 +274,10 @@ a preview is applied"""
             preview.drop_preview(player)
         pins.remove_all_pins(player)
         dots.remove_dot(context.scene, player)
+        notices.clear_player_notices(context.scene, player.name)
         settings.players.remove(settings.active_player)
         settings.active_player = max(0, min(settings.active_player, len(settings.players) - 1))
+        ball_tracks.post_difference(context.scene)
 
 
 def has_character(context) -> bool:
