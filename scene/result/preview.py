@@ -21,7 +21,7 @@ from ..passes import possession
 from ..path_editing import edited_bodies
 from ..stage import cameras
 from ..stage.stage_collection import find_focus
-from . import bake, blocks, key_layers, quality
+from . import bake, ball_tracks, blocks, key_layers, quality
 from . import manual_keys as hand_keys
 from .bake import MARK
 
@@ -159,6 +159,7 @@ def update_shared(context: bpy.types.Context) -> None:
     state.
     """
     _with_free_ball(context, _update_shared_objects)
+    ball_tracks.post_difference(context.scene)
 
 
 class _SharedLength:

@@ -37,6 +37,7 @@ def fill_scene(scene):
     """A player with a take, a match, a passing scene: so much that most of the panels is drawn."""
     settings = scene.beyond_mocap
     settings.library_folder, settings.library_holds = "//library", "43 clips, 4.7 minutes, 22 joints\nJogging: 2.9 m/s"
+    settings.library_gaps = "3 warnings: Clips without labels, 2 motions missing\n1 clip has no labels"
     player = settings.players.add()
     player.name, player.take, player.result.state = "player1", "take", "PREVIEW"
     player.quality, player.warnings = QUALITY, WARNINGS
@@ -55,6 +56,17 @@ def test_nothing_is_cut(context, filled):
     if filled:
         fill_scene(bpy.context.scene)
     assert not list_cut_panels(context)
+
+
+def test_missed_moments_are_in_the_step_of_synthesize(context):
+    settings = bpy.context.scene.beyond_mocap
+    for number in range(1, 7):
+        player = settings.players.add()
+        player.name, player.moments = f"p{number}", "1.0 s  kick\t1.0\tmet\n2.0 s  kick\t2.0\tmissed"
+    settings.players[0].use = False
+    texts = [text for _, text in draw(find_panel("synthesis"), context).drawn]
+    assert "p1: 1 of 2 moments missed" not in texts and "p2: 1 of 2 moments missed" in texts
+    assert "and 1 more players" not in texts and "and 1 more" in texts
 
 
 def test_a_cut_text_would_be_found():
