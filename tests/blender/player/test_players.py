@@ -279,6 +279,35 @@ def refused(operator, message, **arguments):
     assert after == before
 
 
+def test_centimetres_are_refused_at_import(tmp_path):
+    rows = [f"{0.1 * n:.1f},{30 * n},0" for n in range(50)]
+    (tmp_path / "cm.csv").write_text("\n".join(["time_s,x_m,y_m", *rows]))
+    refused(bpy.ops.beyond_mocap.import_tracking, "look like centimetres .* divide x and y by 100",
+            filepath=str(tmp_path / "cm.csv"))
+
+
+def read_last_report(capfd):
+    return capfd.readouterr().out.strip().splitlines()[-1]
+
+
+def test_missed_moments_and_other_balls_are_reported(match, library_folder, session, capfd):
+    """The second player's ball lies far away, and their kick with it."""
+    time = np.arange(0.0, 12.01, 0.1)
+    rows = [f"{t:.1f},{1.3 * t:.3f},0,{1.3 * t + 20:.3f},9,0.11" for t in time]
+    (match / "player2.csv").write_text("\n".join(["time_s,x_m,y_m,ball_x_m,ball_y_m,ball_z_m", *rows]))
+    (match / "player2.txt").write_text("5.0 kick right\n")
+    bpy.context.scene.beyond_mocap.library_folder = str(library_folder)
+    bpy.ops.beyond_mocap.import_tracking(directory=str(match), files=[{"name": "player1.csv"}, {"name": "player2.csv"}])
+    bpy.ops.beyond_mocap.synthesize(player="player1")
+    assert not bpy.context.window_manager.beyond_mocap_notices.rows
+    bpy.ops.beyond_mocap.synthesize()
+    assert "Generated: player1, player2, 1 of 2 moments missed; press Apply or Revert" in read_last_report(capfd)
+    notice, = bpy.context.window_manager.beyond_mocap_notices.rows
+    assert notice.found.startswith("ball of player2: up to ") and notice.room == "synthesis"
+    bpy.ops.beyond_mocap.discard(player="player2")
+    assert not bpy.context.window_manager.beyond_mocap_notices.rows
+
+
 def test_missing_files_are_named(ready, match, tmp_path):
     ready.library_folder = str(tmp_path / "nowhere")
     refused(bpy.ops.beyond_mocap.build_library, "nowhere: no such folder")
