@@ -325,7 +325,7 @@ others; the result is a file that works with any library"""
         """Collect folder, unit and target file."""
         settings = context.scene.beyond_mocap
         if not settings.library_folder:
-            raise InputError("library", "no folder chosen", "a folder of BVH clips", "choose one in step 1",
+            raise InputError("library", "no folder chosen", "a folder of recordings", "choose one in step 1",
                              fixes=(Fix("choose_library"),))
         folder = to_absolute_path(settings.library_folder)
         return LearnOrder(folder, settings.library_unit or None, preferences.find_cache_folder(folder),
