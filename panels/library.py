@@ -106,7 +106,9 @@ def draw_folder(layout, context) -> None:
     column.prop(settings, "library_folder", text="")
     with_progress(layout, context, ("library",), lambda row: row.operator("beyond_mocap.build_library",
                   icon="ASSET_MANAGER"))
-    if context.window_manager.beyond_mocap_clips.missing:
+    if not settings.library_folder:
+        draw_paragraph(layout, "Choose the folder of your recordings first", "INFO")
+    elif context.window_manager.beyond_mocap_clips.missing:
         draw_paragraph(layout, "This folder does not exist", "ERROR")
         layout.operator("beyond_mocap.relink_library", icon="FILE_FOLDER")
 

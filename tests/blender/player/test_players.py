@@ -167,6 +167,16 @@ def test_the_whole_road(extension, ready, core, session):
     assert collect_state() == accepted
 
 
+def test_dots_are_small_while_a_take_is_shown_in_their_place(ready, session):
+    dots = [ready.players[0].dot, bpy.data.objects["Ball dot"]]
+    before = [(dot.empty_display_type, dot.empty_display_size) for dot in dots]
+    bpy.ops.beyond_mocap.synthesize(player="player1")
+    assert {(dot.empty_display_type, round(dot.empty_display_size, 3)) for dot in dots} == {("PLAIN_AXES", 0.05)}
+    assert ready.players[1].dot.empty_display_type == "SPHERE"
+    bpy.ops.beyond_mocap.discard()
+    assert [(dot.empty_display_type, dot.empty_display_size) for dot in dots] == before
+
+
 def test_update_makes_anew_what_a_changed_word_touches(extension, ready, match, core, session):
     bpy.ops.beyond_mocap.build_library()
     refused(bpy.ops.beyond_mocap.update, "Synthesize first")
