@@ -138,8 +138,8 @@ def find_readable_clips(folder: str | Path, place: str | Path,
         what = f"no clip in the folder that can be read, but {len(waiting)} that only Blender reads ({waiting[0].name})"
         raise InputError(folder, what, "at least one .bvh", _CONVERT)
     if not ready:
-        raise InputError(folder, "no clip in the folder", "at least one recording (BVH, SMPL as .npz, FBX, glTF or USD)",
-                         "copy recordings into it")
+        raise InputError(folder, "no clip in the folder",
+                         "at least one recording (BVH, SMPL as .npz, FBX, glTF or USD)", "copy recordings into it")
     return ready, conversions, describe_waiting(waiting)
 
 

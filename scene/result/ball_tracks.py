@@ -35,8 +35,10 @@ def describe_difference(scene: bpy.types.Scene) -> InputError | None:
     found = {name: distance for name, distance in distances.items() if distance}
     if not found:
         return None
-    return InputError(f"ball of {format_some([*found])}", f"up to {max(found.values()):.0f} m from the ball of {first}, "
-                      "which the scene's ball follows", "the same ball in all tracks",
+    most = max(found.values())
+    return InputError(f"ball of {format_some([*found])}",
+                      f"up to {most:.0f} m from the ball of {first}, which the scene's ball follows",
+                      "the same ball in all tracks",
                       "their touches meet their own ball only: show them alone, or give all tracks one ball")
 
 
