@@ -12,7 +12,7 @@ from ..scene.core import frame_range, notices
 from ..scene.core.settings import find_active_player, to_absolute_path, to_setting_path
 from ..scene.match.settings import AUTO, PROVIDER_ITEMS
 from ..scene.player import dots, pins, tracks
-from ..scene.result import preview
+from ..scene.result import ball_tracks, preview
 from ..scene.timeline import label_checks as word_checks
 from ..scene.timeline import strip_events, strips
 from .operator_base import BaseOperator, ImportOperator, ViewDropHandler
@@ -276,8 +276,10 @@ a preview is applied"""
             preview.drop_preview(player)
         pins.remove_all_pins(player)
         dots.remove_dot(context.scene, player)
+        notices.clear_player_notices(context.scene, player.name)
         settings.players.remove(settings.active_player)
         settings.active_player = max(0, min(settings.active_player, len(settings.players) - 1))
+        ball_tracks.post_difference(context.scene)
 
 
 def has_character(context) -> bool:

@@ -6,7 +6,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
-from ..beyond_mocap.base.errors import InputError
+from ..beyond_mocap.base.errors import InputError, format_some
 from ..beyond_mocap.base.fixes import Fix
 from ..beyond_mocap.files.bvh import bvh
 from ..scene.core import action, channels, session, take_record, window
@@ -273,7 +273,9 @@ stays unchanged"""
                                        above=self.read_root(context) if self.keep_root else ())
         for line in export.export_motion(context, rigs, options):
             self.report({"INFO"}, line)
-        self.report({"INFO"}, f"Written: {path}")
+        names = format_some([one.name for one in rigs])
+        left_out = player_character.describe_left_out(context.scene.beyond_mocap, rigs)
+        self.report({"INFO"}, f"Written: {path} with {names}{left_out}")
 
     def list_rigs(self, context) -> list[bpy.types.Object]:
         """List the armatures to export."""
@@ -384,4 +386,5 @@ class BEYOND_MOCAP_OT_export_bvh(BaseOperator, bpy.types.Operator, ExportHelper)
         motion = action.read_motion(context.object, context.scene)
         for note in bvh.write_bvh(bpy.path.abspath(self.filepath), motion):
             self.report({"INFO"}, note)
-        self.report({"INFO"}, f"{len(motion)} frames written to {self.filepath}")
+        left_out = player_character.describe_left_out(context.scene.beyond_mocap, [context.object])
+        self.report({"INFO"}, f"{len(motion)} frames of {context.object.name} written to {self.filepath}{left_out}")

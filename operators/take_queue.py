@@ -14,9 +14,10 @@ from bpy.props import StringProperty
 from ..beyond_mocap import annotation
 from ..beyond_mocap.base.errors import BeyondMocapError, InputError, format_count
 from ..scene.core import background, notices, session
+from ..scene.core.settings import describe_missed_moments
 from ..scene.core.window import show_status, start_timer, stop_timer
 from ..scene.player import dots
-from ..scene.result import freshness, plans, preview, quality, queue
+from ..scene.result import ball_tracks, freshness, plans, preview, quality, queue
 from ..scene.result import synthesis_request as orders
 from ..scene.timeline import strips
 from .library.library import describe_gaps, describe_library
@@ -114,8 +115,10 @@ class TakeOperator(BaseOperator):
             store_result(context, context.scene.beyond_mocap.players[entry.player], entry.request, result)
         self.clear_failures(context.scene, *(entry.player for entry in entries))
         players = [context.scene.beyond_mocap.players[entry.player] for entry in entries]
+        if difference := ball_tracks.describe_difference(context.scene):
+            self.report({"WARNING"}, str(difference))
         names = ", ".join(player.name for player in players)
-        self.report({"INFO"}, f"Generated: {names}{_describe_kept_keys(players)}; press Apply or Revert")
+        self.report({_rate(players)}, f"Generated: {names}{_describe_takes(players)}; press Apply or Revert")
 
     def process_entries(self, window, entries) -> "list[orders.RequestResult]":
         """Generate the takes of all entries, with the progress at the pointer."""
@@ -241,7 +244,8 @@ class TakeOperator(BaseOperator):
         self.stored_count += ok
         self.last = ok
         if ok:
-            self.add_message(f"{player.name}: generated{_describe_kept_keys([player])}; press Apply or Revert")
+            text = f"{player.name}: generated{_describe_takes([player])}; press Apply or Revert"
+            self.add_message(text, _rate([player]))
         return True
 
     current = ""  # the player whose request is built or processed
@@ -268,6 +272,8 @@ class TakeOperator(BaseOperator):
             self.report({kind}, text)
         if self.failed and self.pops_up:
             notices.show_notices(min(self.failed))
+        if self.stored_count and (difference := ball_tracks.describe_difference(context.scene)):
+            self.report({"WARNING"}, str(difference))
         if self.stored_count > 1:
             self.report({"INFO"}, f"Players generated: {self.stored_count}; press Apply or Revert")
         return {"FINISHED"} if self.last else {"CANCELLED"}
@@ -333,10 +339,15 @@ def _name_topic(player: str) -> str:
     return f"take {player}"
 
 
-def _describe_kept_keys(players) -> str:
-    """Describe how many manual keys these players' results have kept."""
-    count = sum(player.result.hand_keys for player in players)
-    return f", {format_count(count, 'manual key')} kept" if count else ""
+def _describe_takes(players) -> str:
+    """Describe what to know about these players' takes: missed moments, and manual keys that they have kept."""
+    missed, count = describe_missed_moments(players), sum(player.result.hand_keys for player in players)
+    return (f", {missed}" if missed else "") + (f", {format_count(count, 'manual key')} kept" if count else "")
+
+
+def _rate(players) -> str:
+    """Return the kind of the report about these players' takes."""
+    return "WARNING" if describe_missed_moments(players) else "INFO"
 
 
 def _find_library(entry: "queue.QueueEntry"):

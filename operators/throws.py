@@ -36,7 +36,7 @@ class TargetOperator(BackgroundOperator):
         shown.show_throw(scene, body, result)
         for line in body.beyond_mocap_throw.messages.splitlines():
             self.report({"WARNING"}, f"{body.name}: {line}")
-        self.report({"INFO"}, f"{body.name}: {'; '.join(shown.list_figures(result))}")
+        self.report({"INFO"}, f"{body.name}: {shown.describe_throw(result)}")
 
 
 class BEYOND_MOCAP_OT_throw_at_target(TargetOperator, bpy.types.Operator):

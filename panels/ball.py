@@ -230,6 +230,8 @@ def draw_passing_scene(layout, context) -> None:
     row.operator("beyond_mocap.passes_from_json", text="From File", icon="IMPORT")
     row.operator("beyond_mocap.passes_to_json", text="To File", icon="EXPORT")
     with_progress(layout, context, ("passes",), draw_make_buttons)
+    if len(settings.players) < 2 or not settings.passes:
+        draw_paragraph(layout, "Add two players and a pass below, or choose a sample", "INFO")
     layout.prop(settings, "live")
     layout.label(text="Players")
     draw_list(layout, "passers", settings, rows="players", active="active_player", operator="passes_list")

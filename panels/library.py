@@ -56,12 +56,15 @@ class BEYOND_MOCAP_PT_library_step(StepPanel, bpy.types.Panel):
         first = settings.library_holds.partition("\n")[0]
         listing = context.window_manager.beyond_mocap_clips
         is_current = bool(settings.library_folder) and listing.folder in ("", settings.library_folder)
-        summary = ", ".join(first.split(", ")[:2])
+        counted = settings.library_gaps.partition(":")[0]  # a file of an earlier version has no count there
+        clips, *more = first.split(", ")[:2]
+        summary = ", ".join([clips, *([counted] if "warning" in counted else more)])  # no room for all three
         return ("done", summary) if first and is_current and not listing.missing else ("next", "")
 
     def draw_step(self, layout, context):
-        """Draw folder and button."""
+        """Draw folder and button, and what the library lacks."""
         draw_folder(layout, context)
+        draw_gaps(layout, context.scene.beyond_mocap)
 
 
 class BEYOND_MOCAP_PT_library(TabPanel, bpy.types.Panel):
@@ -85,10 +88,7 @@ class BEYOND_MOCAP_PT_library(TabPanel, bpy.types.Panel):
         if content:
             if body := draw_header(layout, "library_holds", first):
                 draw_table(body, content)
-        _, *lines = settings.library_gaps.splitlines() or ("",)
-        if lines and (body := draw_header(layout, "library_gaps", "Missing and Left Out", icon="INFO")):
-            for line in lines:
-                draw_paragraph(body, line, "DOT")
+        draw_gaps(layout, settings)
         if body := draw_header(layout, "library_clips", f"Clips ({listing.total})" if current and listing.total
                                else "Clips", closed=False):
             draw_clips(body, settings, listing, current)
@@ -106,9 +106,19 @@ def draw_folder(layout, context) -> None:
     column.prop(settings, "library_folder", text="")
     with_progress(layout, context, ("library",), lambda row: row.operator("beyond_mocap.build_library",
                   icon="ASSET_MANAGER"))
-    if context.window_manager.beyond_mocap_clips.missing:
+    if not settings.library_folder:
+        draw_paragraph(layout, "Choose the folder of your recordings first", "INFO")
+    elif context.window_manager.beyond_mocap_clips.missing:
         draw_paragraph(layout, "This folder does not exist", "ERROR")
         layout.operator("beyond_mocap.relink_library", icon="FILE_FOLDER")
+
+
+def draw_gaps(layout, settings) -> None:
+    """Draw what the library that was built last leaves out and lacks."""
+    _, *lines = settings.library_gaps.splitlines() or ("",)
+    if lines and (body := draw_header(layout, "library_gaps", "Missing and Left Out", icon="INFO")):
+        for line in lines:
+            draw_paragraph(body, line, "DOT")
 
 
 def draw_clips(layout, settings, listing, current) -> None:

@@ -49,6 +49,8 @@ class BEYOND_MOCAP_PT_match(TabPanel, bpy.types.Panel):
         draw_values(create_value_column(layout), match, ("start", "end", "folder"),
                     {"end": match.start + 30.0, "folder": "Automatic"})
         with_progress(layout, context, ("match",), draw_buttons)
+        if match.players and not context.scene.beyond_mocap.library_folder:
+            draw_paragraph(layout, "Choose the library's folder in the step Library first", "INFO")
         draw_section(layout, "match_work", "Processing", lambda opened: draw_processing(opened, context.scene))
         if match.shown:
             draw_display(layout, match)

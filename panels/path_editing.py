@@ -67,8 +67,7 @@ class BEYOND_MOCAP_PT_path(TabPanel, bpy.types.Panel):
                     draw_section(layout, "path_figures", "Figures", lambda opened: draw_figures(opened, figure_text))
                 for line in edit.messages.splitlines():
                     draw_paragraph(layout, line, "INFO")
-        draw_section(layout, "path_cameras", "Cameras & Nudging", lambda opened: draw_cameras(opened, context),
-                     closed=False)
+        draw_section(layout, "path_cameras", "Cameras & Nudging", lambda opened: draw_cameras(opened, context))
         draw_section(layout, "path_overlays", "Overlays",
                      lambda opened: draw_overlays(opened, context.scene.beyond_mocap.view))
 
@@ -141,13 +140,19 @@ def draw_frame_choice(layout, edit) -> None:
 
 
 def draw_cameras(layout, context) -> None:
-    """Draw the four cameras, and the step and directions of nudging."""
+    """Draw the four cameras, and the step and directions of nudging; both only where they can be used."""
     column = layout.column(align=True)
     column.operator("beyond_mocap.path_cameras", icon="VIEW_CAMERA")
-    row, camera = column.grid_flow(columns=2, even_columns=True, align=True), context.scene.camera
-    active_camera = camera.get(CAMERA_MARK) if camera is not None else ""
-    for kind, text in CAMERAS:
-        row.operator("beyond_mocap.path_camera", text=text, depress=kind == active_camera).which = kind
+    if bpy.ops.beyond_mocap.path_camera.poll():
+        row, camera = column.grid_flow(columns=2, even_columns=True, align=True), context.scene.camera
+        active_camera = camera.get(CAMERA_MARK) if camera is not None else ""
+        for kind, text in CAMERAS:
+            row.operator("beyond_mocap.path_camera", text=text, depress=kind == active_camera).which = kind
+    elif not bpy.ops.beyond_mocap.path_cameras.poll():
+        draw_paragraph(layout, "Cameras look at an edited path: press Edit Path first", "INFO")
+    if context.mode != "EDIT_CURVE":
+        draw_paragraph(layout, "Nudging moves points: enter the curve's Edit Mode first (Tab)", "INFO")
+        return
     create_value_column(layout).prop(context.scene.beyond_mocap, "nudge_step", text="Nudge")
     row = layout.row(align=True)
     for direction, icon in NUDGES:

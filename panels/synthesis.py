@@ -5,8 +5,11 @@ from __future__ import annotations
 import bpy
 from bl_ui.utils import PresetPanel
 
-from .tab import StepPanel, draw_automatic, draw_header
+from ..scene.core.settings import describe_missed_moments
+from .tab import StepPanel, draw_automatic, draw_header, draw_paragraph
 from .wrapping import BARE_MARGIN, shorten_progress
+
+MOST_MISSED = 4  # players of whom the panel says that their takes miss moments
 
 
 class BEYOND_MOCAP_MT_presets(bpy.types.Menu):
@@ -58,6 +61,7 @@ class BEYOND_MOCAP_PT_synthesis(StepPanel, bpy.types.Panel):
         row.operator("beyond_mocap.synthesize", icon="ARMATURE_DATA")
         row.operator("beyond_mocap.update", icon="FILE_REFRESH")
         draw_queue(layout, context.window_manager.beyond_mocap_work, settings)
+        draw_missed_moments(layout, settings)
         if body := draw_header(layout, "synthesis_more", "Settings"):
             draw_settings(body, settings)
 
@@ -82,6 +86,16 @@ def draw_queue(layout, running, settings) -> None:
         more = second.row(align=True)
         more.ui_units_x = 2.5
         more.menu("BEYOND_MOCAP_MT_queue", text=f"+{len(waiting)}")
+
+
+def draw_missed_moments(layout, settings) -> None:
+    """Draw a line for each selected player whose take misses key moments, which Quality lists."""
+    missed = [(player.name, text) for player in settings.players
+              if player.use and (text := describe_missed_moments([player]))]
+    for name, text in missed[:MOST_MISSED]:
+        draw_paragraph(layout, f"{name}: {text}", "ERROR")
+    if len(missed) > MOST_MISSED:
+        layout.label(text=f"and {len(missed) - MOST_MISSED} more", icon="BLANK1")
 
 
 def draw_settings(layout, settings) -> None:

@@ -16,6 +16,13 @@ class BEYOND_MOCAP_PT_throws(TabPanel, bpy.types.Panel):
     bl_order = 9
     bl_options = {"DEFAULT_CLOSED"}
 
+    def draw_header_preset(self, context):
+        """Draw ball speed and target error, which are seen while the panel is closed."""
+        body = find_thrower(context)
+        figures = dict(line.split(": ", 1) for line in body.beyond_mocap_throw.figures.splitlines()) if body else {}
+        if "Ball speed" in figures:
+            self.layout.label(text=f"{figures['Ball speed']}, {figures['Target error']} off")
+
     def draw(self, context):
         """Draw the armature, its settings, the two buttons and the figures."""
         layout, body = self.layout, find_thrower(context)

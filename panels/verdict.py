@@ -2,8 +2,8 @@
 
 The rule, which docs/reference/panel-guide.md tells in full:
 
-- Poor: a key moment is missed, or one of ESSENTIAL is beyond its target by half or more, or more than half of all
-  targets are missed
+- Poor: a key moment is missed, or one of ESSENTIAL is as far from its target as stands there, or more than half of
+  all targets are missed
 - Good: all of ESSENTIAL meet their targets, and so do at least nine of ten figures
 - Fair: everything between
 """
@@ -14,9 +14,13 @@ import re
 from functools import lru_cache
 from typing import NamedTuple
 
-ESSENTIAL = ("Distance to track", "Distance, 95 %", "Foot slide", "Slide per step", "Feet out of reach",
-             "Lowest point", "Spins not asked for", "Second strikes", "Ball inside the body")  # seen at once
 FAR = 1.5  # times its target, from where on a missed figure is poor
+ESSENTIAL = {  # figures that one sees at once -> value from which a take is poor; None: FAR times the target
+    "Distance to track": None, "Distance, 95 %": None, "Foot slide": None, "Slide per step": None,
+    "Lowest point": None, "Feet out of reach": 5.0, "Rough transitions": 50.0, "Worst transition": 4.0,
+    "Unusual poses": 50.0, "Second strikes": 2.0, "Ball inside the body": 10.0,
+    "Spins not asked for": 3.0, "Snap turns": 10.0, "Pelvis drops": 10.0, "Jolts": 15.0,  # one in 20 s is 3 a minute
+}  # fmt: skip
 GOOD_SHARE, POOR_SHARE = 0.1, 0.5  # of the targets are missed: at most, more than
 
 
@@ -76,8 +80,12 @@ def _split_columns(line: str) -> tuple[str, str, str]:
 
 
 def _is_far(name: str, target: str) -> bool:
-    """Return whether a figure is beyond its one limit by half of it or more; a limit of zero is no measure."""
-    value, limit = (re.search(r"-?\d+(?:\.\d+)?", text) for text in (name.partition(": ")[2], target))
-    if value is None or limit is None or not float(limit[0]):
+    """Return whether a figure of ESSENTIAL that misses its target is so far from it that the take is poor."""
+    title, _, text = name.partition(": ")
+    value, limit = (re.search(r"-?\d+(?:\.\d+)?", part) for part in (text, target))
+    if value is None or limit is None:
         return False
-    return float(value[0]) / float(limit[0]) >= FAR
+    poor_from, most = ESSENTIAL[title], float(limit[0])
+    if poor_from is not None:
+        return float(value[0]) >= poor_from
+    return most != 0.0 and float(value[0]) / most >= FAR  # zero is no measure

@@ -99,7 +99,7 @@ def build_library(
     digests = cache.SourceDigests(place)
     key = cache.compute_fingerprint(folder, files, sources, skeleton_file, digests, unit=unit)
     if not rebuild:
-        report(0.0, "Reading the cache")
+        report(0.0, "Reading the cache" if cache.has_library(place) else "Reading the recordings")
         found = cache.load_library(place, key)
         if found is not None:
             write_synthetic_clips(place, _list_completed(found["clips"]), missing_only=True)

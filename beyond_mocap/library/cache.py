@@ -329,6 +329,16 @@ def _build_header(key: str, library) -> dict:
     }  # fmt: skip
 
 
+def has_library(place: Path, name: str = "library") -> bool:
+    """Return whether a folder holds a cached library, of whatever content.
+
+    Args:
+        place: the cache's folder.
+        name: of the file, without its ending.
+    """
+    return (place / f"{name}.json").is_file()
+
+
 def load_library(place: Path, key: str, name: str = "library") -> dict | None:
     """Load the fields of a cached library; its arrays are mapped into memory and read where they are used.
 

@@ -64,7 +64,7 @@ def find_recordings(folder: str | Path, endings: tuple[str, ...] = (*CLIP_ENDING
     """
     folder = Path(folder)
     if not folder.is_dir():
-        raise InputError(folder, describe_no_folder(folder), "a folder with BVH files",
+        raise InputError(folder, describe_no_folder(folder), "a folder with recordings",
                          "choose the folder of your library", fixes=(Fix("relink_library"),))
     found: dict[str, Path] = {}  # name below the folder -> file
     seen: set[tuple[int, int] | str] = set()
@@ -138,7 +138,8 @@ def find_readable_clips(folder: str | Path, place: str | Path,
         what = f"no clip in the folder that can be read, but {len(waiting)} that only Blender reads ({waiting[0].name})"
         raise InputError(folder, what, "at least one .bvh", _CONVERT)
     if not ready:
-        raise InputError(folder, "no clip in the folder", "at least one .bvh or .npz", "copy recordings into it")
+        raise InputError(folder, "no clip in the folder",
+                         "at least one recording (BVH, SMPL as .npz, FBX, glTF or USD)", "copy recordings into it")
     return ready, conversions, describe_waiting(waiting)
 
 

@@ -236,13 +236,13 @@ def _describe_turning(before: float, begin: float, rotation: float, offset: np.n
     warnings = []
     if abs(before) > _WARN_HEADING:
         warnings.append(TimedMessage(
-            f"{begin:.1f} s: the body turns {abs(np.degrees(before)):.0f} degrees to the start of the throw; let it "
-            "face the target before, or choose a library for the run-up", (begin, begin),
+            f"{begin:.1f} s: the body turns {abs(np.degrees(before)):.0f} degrees to the start of the throw or kick; "
+            "let it face the target before, or choose a library for the run-up", (begin, begin),
         ))  # fmt: skip
     if np.linalg.norm(offset[:2]) > _WARN_OFFSET or abs(rotation) > _WARN_ROTATION:
         warnings.append(TimedMessage(
-            f"{end:.1f} s: the following motion continues from the end of the throw, rotated by "
-            f"{np.degrees(rotation):.0f} degrees",
+            f"{end:.1f} s: the following motion continues from the end of the throw or kick, "
+            f"rotated by {np.degrees(rotation):.0f} degrees",
             (end, end),
         ))  # fmt: skip
     return tuple(warnings)

@@ -137,14 +137,13 @@ def _list_warnings(part: _Stretch, library: Library, root: np.ndarray) -> list[s
     warnings: list[str] = []
     if not part.returns:
         when = part.start + part.end / fps
-        text = (
-            f"{when:.1f} s: no time to return to the own path; the following motion continues from the end of the throw"
-        )
+        text = (f"{when:.1f} s: no time to return to the own path; the following motion continues from the end of the "
+                "throw or kick")
         warnings.append(TimedMessage(text, (when, when)))
     fastest = float(np.linalg.norm(np.diff(root[part.low : part.high, :2], axis=0), axis=1).max() * fps)
     if fastest > _MAX_SPEED_RATIO * max(library.max_speed, _compute_easy_speed(part.own_motion)):
         warnings.append(
-            f"the body has to move at {fastest:.1f} m/s around the throw: choose another frame or target"
+            f"the body has to move at {fastest:.1f} m/s around the throw or kick: choose another frame or target"
         )
     return warnings
 

@@ -43,7 +43,8 @@ the motion, from the hips up and in metres"""
         """List the chosen files, and all below a chosen folder."""
         chosen = self.list_chosen_files() or ([Path(self.directory)] if self.directory else [])
         if not chosen:
-            raise InputError("import", "no file given", "a .bvh or .npz file, or a folder", "choose one")
+            raise InputError("import", "no file given",
+                             "a recording (BVH, SMPL as .npz, FBX, glTF or USD), or a folder", "choose one")
         return [file for path in chosen for file in (_list_clips_below(path) if path.is_dir() else [path])]
 
     def do(self, context):

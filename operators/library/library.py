@@ -204,7 +204,7 @@ def describe_library(library: "Library") -> str:
 
 def describe_gaps(library: "Library") -> str:
     """Describe for the panel, one line each, what is proposed, without labels, missing and left out of locomotion; the
-    first line sums it up; "" where there is nothing to say.
+    first line counts and sums up these warnings; "" where there is nothing to say.
     """
     from ...beyond_mocap.library.left_out import describe_left_out
 
@@ -214,7 +214,9 @@ def describe_gaps(library: "Library") -> str:
     parts += ["Clips without labels"] if library.unlabelled_notes else []
     parts += [f"{format_count(len(missing), 'motion')} missing"] if missing else []
     parts += [left_out[0].partition(":")[0]] if left_out else []
-    return "\n".join([", ".join(parts), *labels, *missing, *left_out]) if parts else ""
+    count = len(labels) + len(missing) + bool(left_out)
+    first = f"{format_count(count, 'warning')}: {', '.join(parts)}"
+    return "\n".join([first, *labels, *missing, *left_out]) if parts else ""
 
 
 class ListOrder(NamedTuple):

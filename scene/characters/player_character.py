@@ -7,9 +7,10 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ...beyond_mocap.base.errors import BeyondMocapError
+from ...beyond_mocap.base.errors import BeyondMocapError, format_some
 from ..core import channels, session
 from ..core.measure import frames_per_second
+from ..core.properties import find_active_row
 from ..rigs.fit import SourceMotion, read_source
 from . import copies
 from .ball_touches import BallTouch, list_ball_touches
@@ -94,6 +95,23 @@ def remove_character(player) -> None:
 def find_shown_body(player) -> bpy.types.Object | None:
     """Find the armature that shows a player's motion: their rig, their character, or the built-in body."""
     return player.rig or player.character_body or player.body
+
+
+def describe_left_out(settings, exported: list[bpy.types.Object]) -> str:
+    """Describe which selected players an export of others leaves out, to be put behind its message; "" for none.
+
+    Args:
+        settings: of the scene.
+        exported: the armatures that are exported.
+    """
+    found = {*exported}
+    if settings.rig.target in found:
+        active = find_active_row(settings.players, settings.active_player)
+        found.add(settings.rig.source or (active.body if active is not None else None))
+    bodies = {player.name: {player.rig, player.character_body, player.body} - {None}
+              for player in settings.players if player.use and player.body is not None}
+    names = [name for name, theirs in bodies.items() if theirs.isdisjoint(found)]
+    return f"; without {format_some(names)}" if 0 < len(names) < len(bodies) else ""
 
 
 def update_kit(player) -> None:

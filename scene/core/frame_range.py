@@ -5,6 +5,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from . import window
+
 FRESH = (1, 250)  # first and last frame of Blender's new files
 
 
@@ -17,13 +19,20 @@ def fit_range(scene: bpy.types.Scene, last: float, things: list[bpy.types.Object
         things: the imported objects.
     """
     if (scene.frame_start, scene.frame_end) == FRESH and not _has_other_animation(scene, things):
-        scene.frame_end = max(scene.frame_start + 1, int(np.floor(last + 1e-4)))
+        _set_end(scene, max(scene.frame_start + 1, int(np.floor(last + 1e-4))))
     extend_range(scene, last)
 
 
 def extend_range(scene: bpy.types.Scene, last: float) -> None:
     """Extend the scene's frame range to `last`."""
-    scene.frame_end = max(scene.frame_end, int(np.floor(last + 1e-4)))
+    _set_end(scene, max(scene.frame_end, int(np.floor(last + 1e-4))))
+
+
+def _set_end(scene: bpy.types.Scene, last: int) -> None:
+    """Set the scene's last frame, and show the new range in the timelines."""
+    if scene.frame_end != last:
+        scene.frame_end = last
+        window.show_range(scene)
 
 
 def _has_other_animation(scene: bpy.types.Scene, things: list[bpy.types.Object]) -> bool:

@@ -133,6 +133,11 @@ def clear_notices(scene: bpy.types.Scene, *topics: str) -> None:
     _remove_rows(lambda row: row.scene == str(scene.session_uid) and row.topic in topics)
 
 
+def clear_player_notices(scene: bpy.types.Scene, player: str) -> None:
+    """Clear the notices of a scene about a player, who is no longer in its list."""
+    _remove_rows(lambda row: row.scene == str(scene.session_uid) and row.player == player)
+
+
 def dismiss_notice(number: int) -> None:
     """Remove the notice of that number, if it is still there."""
     _remove_rows(lambda row: row.number == number)

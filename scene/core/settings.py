@@ -135,7 +135,7 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
     rig: PointerProperty(type=BeyondMocapRig, description="Rig, bone map, baking and export")
     library_folder: StringProperty(
         name="Library", subtype="DIR_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
-        description="Folder of recordings with their annotations; may be relative to this file",
+        description="Folder of recordings (BVH, SMPL, FBX, glTF, USD) with their labels; may be relative to this file",
     )
     words_model: StringProperty(
         name="Learned Labels", **FILE,
@@ -179,7 +179,7 @@ def to_absolute_path(path: str) -> str:
 def require_library_folder(settings: "BeyondMocapSettings") -> str:
     """Return the absolute path of the library's folder; InputError where none is chosen."""
     if not settings.library_folder:
-        raise InputError("library", "no folder chosen", "a folder of clips", "choose one in step 1",
+        raise InputError("library", "no folder chosen", "a folder of recordings", "choose one in step 1",
                          fixes=(Fix("choose_library"),))
     return to_absolute_path(settings.library_folder)
 
@@ -197,3 +197,10 @@ def to_setting_path(path: str) -> str:
 def find_active_player(settings: BeyondMocapSettings) -> BeyondMocapPlayer | None:
     """Return the player chosen in the list; None while the list is empty."""
     return find_active_row(settings.players, settings.active_player)
+
+
+def describe_missed_moments(players) -> str:
+    """Describe how many key moments the newest takes of players miss, such as "1 of 3 moments missed"; "" for none."""
+    states = [line.rpartition("\t")[2] for player in players for line in player.moments.splitlines()]
+    missed = states.count("missed")
+    return f"{missed} of {len(states)} moment{'s' if len(states) > 1 else ''} missed" if missed else ""

@@ -38,6 +38,16 @@ def redraw_editors(*kinds: str) -> None:
                 area.tag_redraw()
 
 
+def show_range(scene: bpy.types.Scene) -> None:
+    """Show a scene's whole frame range in its timelines: their view stays where it is when a script sets the range."""
+    for window in bpy.context.window_manager.windows if not bpy.app.background else ():
+        for area in window.screen.areas if window.scene == scene else ():
+            if area.type == "DOPESHEET_EDITOR" and area.spaces.active.mode == "TIMELINE":
+                region = next(region for region in area.regions if region.type == "WINDOW")
+                with bpy.context.temp_override(window=window, area=area, region=region):
+                    bpy.ops.action.view_all()
+
+
 def start_timer(context: bpy.types.Context) -> bpy.types.Timer:
     """Start timer events for an operator that polls a thread, and progress at the pointer; return the timer."""
     windows = context.window_manager

@@ -121,7 +121,7 @@ def build_order(scene: bpy.types.Scene) -> Order:
     if not folder:
         raise InputError("library", "no folder chosen",
                          "a folder of clips with strikes, such as sample_blend/passes/library",
-                         "choose one under Choices, or in step 1", fixes=(Fix("choose_library"),))
+                         "choose one under Options, or in step 1", fixes=(Fix("choose_library"),))
     for row in settings.players:
         if row.body is not None:
             channels.check_local(row.body)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 BALL = "Ball dot"
 MARK = "beyond_mocap_dot"  # on actions that move a dot and may be regenerated
 SIZE, BALL_SIZE = 0.4, 0.11  # metres
+SMALL = 0.05  # metres: a cross in place of a dot whose player or ball is shown
 BALL_RGB = (0.9, 0.9, 0.9)
 FILES = ("tracking_file", "metadata_file")  # absolute: a dot may be appended to a file in another folder
 ORIGIN = (*FILES, "feed_id", "provider", "shirt")
@@ -79,6 +80,30 @@ def update_dot(player: BeyondMocapPlayer) -> None:
     for name in ORIGIN:
         value = getattr(player, name)
         setattr(dot.beyond_mocap_dot, name, to_absolute_path(value) if name in FILES else value)
+
+
+def update_displays(scene: bpy.types.Scene, shown: list[BeyondMocapPlayer]) -> None:
+    """Show dots as small crosses where a body or the ball is shown in their place, else as spheres; those that a user
+    displays differently stay as they are.
+
+    Args:
+        scene: the scene.
+        shown: players whose takes are shown.
+    """
+    for player in scene.beyond_mocap.players:
+        if player.dot is not None and player.dot.library is None:
+            _update_display(scene, player.dot, SIZE, player in shown)
+    room = bake.find_or_create_collection(scene)
+    ball = names.find_named(room.objects, BALL)
+    if ball is not None and ball.library is None:
+        _update_display(scene, ball, BALL_SIZE, bool(shown) and names.find_named(room.objects, bake.BALL) is not None)
+
+
+def _update_display(scene: bpy.types.Scene, dot: bpy.types.Object, size: float, is_covered: bool) -> None:
+    units = units_per_metre(scene)
+    large, small = ("SPHERE", float(np.float32(size * units))), ("PLAIN_AXES", float(np.float32(SMALL * units)))
+    if (dot.empty_display_type, dot.empty_display_size) == (large if is_covered else small):
+        dot.empty_display_type, dot.empty_display_size = small if is_covered else large
 
 
 def remove_dot(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> None:

@@ -12,6 +12,7 @@ from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.files.joints.joint_readers import is_joint_file
 from ...beyond_mocap.files.tracking import tracking
 from ...beyond_mocap.files.tracking.feed import is_track_csv
+from ...beyond_mocap.motion.track import clean_track
 from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, to_absolute_path
 from . import drawn_track
 
@@ -39,7 +40,7 @@ class PlayerInFile(NamedTuple):
 def list_players(path: str, metadata: str = "", provider: str = "") -> tuple[list[PlayerInFile], tuple[str, ...]]:
     """List the players of a tracking file, and notes on assumptions; InputError where it cannot be read."""
     if is_track_csv(Path(path)):
-        track = _read_plain_track(path)
+        track, _ = clean_track(_read_plain_track(path))  # refuses what is not a player's, such as centimetres
         return [PlayerInFile(Path(path).stem, "", "home", float(track.times.min()), float(track.times.max()))], ()
     match = read_match(path, metadata, provider)
     start, end = float(match.times[0]), float(match.times[-1])

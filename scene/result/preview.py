@@ -19,9 +19,10 @@ from ..core.saved_state import discard_saved_state, restore_nla, restore_playbac
 from ..core.settings import BeyondMocapPlayer
 from ..passes import possession
 from ..path_editing import edited_bodies
+from ..player import dots
 from ..stage import cameras
 from ..stage.stage_collection import find_focus
-from . import bake, blocks, key_layers, quality
+from . import bake, ball_tracks, blocks, key_layers, quality
 from . import manual_keys as hand_keys
 from .bake import MARK
 
@@ -159,6 +160,9 @@ def update_shared(context: bpy.types.Context) -> None:
     state.
     """
     _with_free_ball(context, _update_shared_objects)
+    ball_tracks.post_difference(context.scene)
+    players = context.scene.beyond_mocap.players
+    dots.update_displays(context.scene, [player for player in players if is_shown(context.scene, player)])
 
 
 class _SharedLength:

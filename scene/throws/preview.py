@@ -107,6 +107,13 @@ def list_figures(result: "ThrowPreview") -> list[str]:
     return lines
 
 
+def describe_throw(result: "ThrowPreview") -> str:
+    """Describe in a line what one asks of a throw first: how fast the ball is, and how near it comes to the target."""
+    thrown = result.thrown
+    return (f"the ball leaves at {float(np.linalg.norm(thrown.launch.velocity)):.1f} m/s and passes "
+            f"{100.0 * thrown.impact_error:.1f} cm from the target")
+
+
 def _reset_results(settings) -> None:
     for name in RESULTS:
         settings.property_unset(name)

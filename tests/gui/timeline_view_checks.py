@@ -204,6 +204,20 @@ def check_a_dragged_strip_tells_seconds():
     assert lines and "(+" in lines[0] and lines[1] == "2 clips have celebration running arms outside", lines
 
 
+def check_timelines_show_a_range_that_has_grown():
+    yield from open_sample()
+    area = max(window.window.screen.areas, key=lambda area: area.width * area.height)
+    area.ui_type = "TIMELINE"
+    yield 0.5
+    region, scene = next(region for region in area.regions if region.type == "WINDOW"), bpy.context.scene
+    end = scene.frame_end + 1000
+    assert region.view2d.region_to_view(region.width, 0)[0] < end
+    import_module("scene.core.frame_range").extend_range(scene, end)
+    yield 0.7
+    low, high = (region.view2d.region_to_view(x, 0)[0] for x in (0, region.width))
+    assert scene.frame_end == end and low < scene.frame_start and end < high < end + 300, (low, high)
+
+
 def check_a_hundred_strips_are_drawn_quickly():
     """Time of the main thread, whatever else runs; a software renderer's own threads are not ours."""
     yield from open_sample()

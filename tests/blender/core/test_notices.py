@@ -111,6 +111,11 @@ def test_success_and_dismissal_remove_a_notice(lacking):
     assert list_notices() == [] and player.take
 
 
+def test_a_removed_player_s_notices_go_with_them(lacking):
+    assert [row.player for row in list_notices()] == ["player2"]
+    assert bpy.ops.beyond_mocap.remove_player() == {"FINISHED"} and list_notices() == []
+
+
 def test_a_moved_library_is_chosen_and_what_failed_runs_again(places, tmp_path):
     import_player(places, "")
     shutil.copytree(places.clips, tmp_path / "elsewhere")

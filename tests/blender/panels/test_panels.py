@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import bpy
 import pytest
-from fake_layout import FakeLayout, create_context, draw, list_cut, list_cut_panels, list_panels
+from fake_layout import FakeLayout, FakePanel, create_context, draw, list_cut, list_cut_panels, list_panels
 
 MAIN = {  # panel -> operators whose place is not to change
     "library_step": ("build_library",),
@@ -37,6 +37,7 @@ def fill_scene(scene):
     """A player with a take, a match, a passing scene: so much that most of the panels is drawn."""
     settings = scene.beyond_mocap
     settings.library_folder, settings.library_holds = "//library", "43 clips, 4.7 minutes, 22 joints\nJogging: 2.9 m/s"
+    settings.library_gaps = "3 warnings: Clips without labels, 2 motions missing\n1 clip has no labels"
     player = settings.players.add()
     player.name, player.take, player.result.state = "player1", "take", "PREVIEW"
     player.quality, player.warnings = QUALITY, WARNINGS
@@ -55,6 +56,37 @@ def test_nothing_is_cut(context, filled):
     if filled:
         fill_scene(bpy.context.scene)
     assert not list_cut_panels(context)
+
+
+def test_missed_moments_are_in_the_step_of_synthesize(context):
+    settings = bpy.context.scene.beyond_mocap
+    for number in range(1, 7):
+        player = settings.players.add()
+        player.name, player.moments = f"p{number}", "1.0 s  kick\t1.0\tmet\n2.0 s  kick\t2.0\tmissed"
+    settings.players[0].use = False
+    texts = [text for _, text in draw(find_panel("synthesis"), context).drawn]
+    assert "p1: 1 of 2 moments missed" not in texts and "p2: 1 of 2 moments missed" in texts
+    assert "and 1 more players" not in texts and "and 1 more" in texts
+
+
+@pytest.mark.parametrize("name, line", [
+    ("library", "Choose the folder of your"), ("match", "Choose the library's folder"),
+    ("ball", "Add two players and a pass"), ("path", "Nudging moves points:")])
+def test_a_greyed_button_says_why_in_the_panel(context, name, line):
+    scene = bpy.context.scene
+    scene.beyond_mocap_match.players.add().name = "Somebody"
+    assert any(text.startswith(line) for _, text in draw(find_panel(name), context).drawn)
+    fill_scene(scene)
+    if name != "path":  # its curve is not in Edit Mode
+        assert not any(text.startswith(line) for _, text in draw(find_panel(name), context).drawn)
+
+
+def test_the_closed_panel_of_a_throw_shows_its_figures(context):
+    fill_scene(bpy.context.scene)
+    bpy.context.object.beyond_mocap_throw.figures = "Release frame: 60.0\nBall speed: 15.0 m/s\nTarget error: 3.2 cm"
+    context.object, layout = bpy.context.object, FakeLayout()
+    find_panel("throws").draw_header_preset(FakePanel(find_panel("throws"), layout), context)
+    assert layout.drawn == [("label", "15.0 m/s, 3.2 cm off")]
 
 
 def test_a_cut_text_would_be_found():

@@ -14,12 +14,18 @@ def judge(extension):
 
 @pytest.mark.parametrize("more, word", [
     ("", "Good"),
-    ("Jolts: 6.0 /min\t≤ 1.0\tmissed", "Good"),  # one of 21, and not seen at once
+    ("Cuts: 36 /min\t≤ 30\tmissed", "Good"),  # one of 21, and not seen at once
     ("Foot slide: 3.5 cm/s\t≤ 3.2\tmissed", "Fair"),
     ("Foot slide: 4.9 cm/s\t≤ 3.2\tmissed", "Poor"),
     ("Lowest point: -6.0 mm\t≥ -5.0\tmissed", "Fair"),
     ("Lowest point: -9.0 mm\t≥ -5.0\tmissed", "Poor"),
-    ("Ball inside the body: 2 frames\t≤ 0\tmissed", "Fair"),
+    *((f"{name}: {value}\t≤ {target}\tmissed", word) for name, target, fair, poor in (
+        ("Rough transitions", "10", "41 %", "89 %"), ("Worst transition", "1.30", "2.99 x", "4.78 x"),
+        ("Unusual poses", "10.0", "12.0 %", "100.0 %"), ("Jolts", "1.0", "6.0 /min", "24.9 /min"),
+        ("Pelvis drops", "0.6", "4.2 /min", "12.0 /min"), ("Snap turns", "0.6", "3.0 /min", "12.0 /min"),
+        ("Spins not asked for", "0.0", "1.5 /min", "3.0 /min"), ("Second strikes", "0", "1", "2"),
+        ("Feet out of reach", "0.0", "0.4 %", "6.0 %"), ("Ball inside the body", "0", "2 frames", "12 frames"),
+    ) for value, word in ((fair, "Fair"), (poor, "Poor"))),
     ("\n".join(f"Other {number}: 6\t≤ 1\tmissed" for number in range(3)), "Fair"),
     ("\n".join(f"Other {number}: 6\t≤ 1\tmissed" for number in range(21)), "Poor"),
     ("Computing time: 1.7 s\t\t", "Good"),

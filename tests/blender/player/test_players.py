@@ -167,6 +167,16 @@ def test_the_whole_road(extension, ready, core, session):
     assert collect_state() == accepted
 
 
+def test_dots_are_small_while_a_take_is_shown_in_their_place(ready, session):
+    dots = [ready.players[0].dot, bpy.data.objects["Ball dot"]]
+    before = [(dot.empty_display_type, dot.empty_display_size) for dot in dots]
+    bpy.ops.beyond_mocap.synthesize(player="player1")
+    assert {(dot.empty_display_type, round(dot.empty_display_size, 3)) for dot in dots} == {("PLAIN_AXES", 0.05)}
+    assert ready.players[1].dot.empty_display_type == "SPHERE"
+    bpy.ops.beyond_mocap.discard()
+    assert [(dot.empty_display_type, dot.empty_display_size) for dot in dots] == before
+
+
 def test_update_makes_anew_what_a_changed_word_touches(extension, ready, match, core, session):
     bpy.ops.beyond_mocap.build_library()
     refused(bpy.ops.beyond_mocap.update, "Synthesize first")
@@ -277,6 +287,35 @@ def refused(operator, message, **arguments):
     for name in ("library_holds", "library_gaps"):
         assert after["settings"].pop(name).startswith(before["settings"].pop(name))
     assert after == before
+
+
+def test_centimetres_are_refused_at_import(tmp_path):
+    rows = [f"{0.1 * n:.1f},{30 * n},0" for n in range(50)]
+    (tmp_path / "cm.csv").write_text("\n".join(["time_s,x_m,y_m", *rows]))
+    refused(bpy.ops.beyond_mocap.import_tracking, "look like centimetres .* divide x and y by 100",
+            filepath=str(tmp_path / "cm.csv"))
+
+
+def read_last_report(capfd):
+    return capfd.readouterr().out.strip().splitlines()[-1]
+
+
+def test_missed_moments_and_other_balls_are_reported(match, library_folder, session, capfd):
+    """The second player's ball lies far away, and their kick with it."""
+    time = np.arange(0.0, 12.01, 0.1)
+    rows = [f"{t:.1f},{1.3 * t:.3f},0,{1.3 * t + 20:.3f},9,0.11" for t in time]
+    (match / "player2.csv").write_text("\n".join(["time_s,x_m,y_m,ball_x_m,ball_y_m,ball_z_m", *rows]))
+    (match / "player2.txt").write_text("5.0 kick right\n")
+    bpy.context.scene.beyond_mocap.library_folder = str(library_folder)
+    bpy.ops.beyond_mocap.import_tracking(directory=str(match), files=[{"name": "player1.csv"}, {"name": "player2.csv"}])
+    bpy.ops.beyond_mocap.synthesize(player="player1")
+    assert not bpy.context.window_manager.beyond_mocap_notices.rows
+    bpy.ops.beyond_mocap.synthesize()
+    assert "Generated: player1, player2, 1 of 2 moments missed; press Apply or Revert" in read_last_report(capfd)
+    notice, = bpy.context.window_manager.beyond_mocap_notices.rows
+    assert notice.found.startswith("ball of player2: up to ") and notice.room == "synthesis"
+    bpy.ops.beyond_mocap.discard(player="player2")
+    assert not bpy.context.window_manager.beyond_mocap_notices.rows
 
 
 def test_missing_files_are_named(ready, match, tmp_path):

@@ -221,6 +221,21 @@ def test_several_at_once(rooms, body, tmp_path):
     assert sorted(o.name for o in bpy.data.objects if o.type == "ARMATURE") == ["Body", "Mixamo"]
 
 
+def test_players_that_an_export_leaves_out_are_reported(body, tmp_path, capfd):
+    settings, bodies = bpy.context.scene.beyond_mocap, [body, body.copy()]
+    bpy.context.scene.collection.objects.link(bodies[1])
+    for name, one in zip(("first", "second"), bodies):
+        player = settings.players.add()
+        player.name, player.body = name, one
+    select(body)
+    options = {"filepath": str(tmp_path / "out.fbx"), "meshes": False}
+    for who, said in (("ACTIVE", "out.fbx with Body; without second"), ("PLAYERS", "with Body, Body.001")):
+        assert bpy.ops.beyond_mocap.export_motion("EXEC_DEFAULT", who=who, **options) == {"FINISHED"}
+        assert capfd.readouterr().out.strip().splitlines()[-1].endswith(said)
+    bpy.ops.beyond_mocap.export_bvh(filepath=str(tmp_path / "out.bvh"))
+    assert "frames of Body written to" in (line := capfd.readouterr().out) and line.strip().endswith("; without second")
+
+
 def test_the_file_browser_shows_the_name_that_is_written(rooms, extension):
     operator = importlib.import_module(f"{extension.__name__}.operators.rigs").BEYOND_MOCAP_OT_export_motion
     for name, format, written in (("walk", "FBX", "walk.fbx"), ("walk.glb", "FBX", "walk.fbx"),

@@ -3,6 +3,7 @@
 import importlib
 import json
 import pathlib
+import re
 
 import bpy
 import numpy as np
@@ -119,7 +120,7 @@ def test_a_library_joins_it(room, clips):
     assert len(now) >= len(own)
 
 
-def test_a_ball_that_lies_is_kicked_into_the_target(room):
+def test_a_ball_that_lies_is_kicked_into_the_target(room, capfd):
     goal = (16.0, 3.0, 0.8)
     body = a_body(target=goal)
     ball = importlib.import_module(f"{EXTENSION}.scene.stage.ball").create_ball(
@@ -129,6 +130,7 @@ def test_a_ball_that_lies_is_kicked_into_the_target(room):
     wish = body.beyond_mocap_throw
     wish.ball = ball
     assert press_operator(bpy.ops.beyond_mocap.kick_at_target) == {"FINISHED"}
+    assert re.search(r": the ball leaves at [\d.]+ m/s and passes [\d.]+ cm from the target", capfd.readouterr().out)
     assert wish.made == "kick" and wish.flown == ball and not ball.constraints
     first = int(np.floor(wish.release))
     assert closest(ball, np.array(goal), first + 1, first + 60) < 0.10
