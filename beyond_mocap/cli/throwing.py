@@ -67,10 +67,9 @@ def _require_training() -> None:
     try:
         if core != "beyond_mocap":  # inside Blender the core has another name, but training imports it by this one
             raise ImportError
+        import training  # noqa: F401, I001  # first: it sets where jax, once imported, keeps compiled code
         import jax  # noqa: F401
         import optax  # noqa: F401
-
-        import training  # noqa: F401
     except ImportError:
         raise InputError(
             "throw train", "this Python cannot train", "jax, optax and the project's folder",

@@ -1,7 +1,10 @@
 """The environment that trains: jax and optax there, Blender not, and one line where they are missing."""
 
+import os
+import subprocess
 import sys
 from importlib.util import find_spec
+from pathlib import Path
 
 import pytest
 
@@ -14,6 +17,16 @@ def test_jax_is_there_and_blender_is_not():
 
     assert float(jnp.sum(jnp.arange(4))) == 6.0 and optax.adam(1e-3)
     assert find_spec("bpy") is None
+
+
+def test_the_command_keeps_compiled_code(tmp_path):
+    """jax reads where to keep it when it is imported, so that has to be set before."""
+    code = ("from beyond_mocap.cli import throwing; throwing._require_training(); import jax; "
+            "print(jax.config.jax_compilation_cache_dir)")
+    environment = {name: text for name, text in os.environ.items() if name != "JAX_COMPILATION_CACHE_DIR"}
+    done = subprocess.run([sys.executable, "-c", code], cwd=Path(__file__).resolve().parents[2], text=True, check=True,
+                          capture_output=True, env={**environment, "XDG_CACHE_HOME": str(tmp_path)})
+    assert done.stdout.strip() == str(tmp_path / "beyond-mocap" / "compiled")
 
 
 @pytest.mark.parametrize("missing", ["jax", "optax", "training"])
