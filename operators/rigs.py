@@ -9,6 +9,7 @@ from bpy_extras.io_utils import ExportHelper, ImportHelper
 from ..beyond_mocap.base.errors import InputError, format_some
 from ..beyond_mocap.base.fixes import Fix
 from ..beyond_mocap.files.bvh import bvh
+from ..scene.characters import player_character
 from ..scene.core import action, channels, session, take_record, window
 from ..scene.core.settings import find_active_player, to_absolute_path
 from ..scene.match import match_objects
