@@ -40,7 +40,7 @@ from .features import Frames, list_frame_arrays
 from .scan import CACHE_FOLDER, read_stamp
 
 # raised whenever what is computed or stored changes, so that old caches are not used
-VERSION = 47
+VERSION = 48
 MOTIONS = "motions.npy"
 """Name of the file with the motions of all clips (`files.motion_file`)."""
 _DIGESTS, _COVERAGE = "digests.json", "coverage"

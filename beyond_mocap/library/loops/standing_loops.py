@@ -14,13 +14,16 @@ import numpy as np
 from ...base.time_series import find_runs
 from ...motion.motion import Motion, sample_frames
 from ..features import Frames
+from ..posture import PARTS
 
 LOOP_SECONDS = 16.0  # of a loop
 MIN_STAND_SECONDS = 1.2  # of recording; less moves too little to look alive
 MAX_STANDS = 6
 MAX_STANDS_OF_CLIP = 2
 _STILL_SPEED = 0.15  # m/s of the root's path
-_MOST_TURN, _MOST_SHIFT = np.radians(20.0), 0.08  # rad and m that a body turns and shifts its weight by in one stand
+# rad, m and leg lengths that a body turns, shifts its weight and sinks by in one stand: who gets ready to jump, and is
+# played forward and backward, squats again and again
+_MOST_TURN, _MOST_SHIFT, _MOST_SINKING = np.radians(20.0), 0.08, 0.06
 
 
 def iter_standing_loops(clips: Sequence, frames: Frames, fps: float, strangeness: np.ndarray,
@@ -56,17 +59,22 @@ def find_stands(clips: Sequence, frames: Frames, fps: float, strangeness: np.nda
         nearest = np.minimum(np.rint(frames.source[at]).astype(int), len(clip.heel_toe_contacts) - 1)
         both = clip.heel_toe_contacts.any(axis=2).all(axis=1)[nearest]
         calm = both & (speed[at] < _STILL_SPEED) & (strangeness[at] <= 1.0)
-        runs = [part for run in find_runs(calm) for part in _split_at_turns(frames.heading[at], frames.path[at], *run)
+        moves = np.column_stack([frames.heading[at], frames.path[at], frames.posture[at, PARTS["hips"]]])
+        runs = [part for run in find_runs(calm) for part in _split_at_moves(moves, *run)
                 if part[1] - part[0] >= MIN_STAND_SECONDS * fps]
         longest = sorted(runs, key=lambda run: run[0] - run[1])[:MAX_STANDS_OF_CLIP]
         found += [(index, at.start + first, at.start + end) for first, end in longest]
     return sorted(found, key=lambda stand: stand[1] - stand[2])[:MAX_STANDS]
 
 
-def _split_at_turns(heading: np.ndarray, path: np.ndarray, first: int, end: int) -> Iterator[tuple[int, int]]:
-    """Split a stand where the body has turned or shifted too far for one: (first, end) of each part."""
-    values = np.column_stack([heading, path])[first:end].tolist()
-    most = (_MOST_TURN, *[_MOST_SHIFT] * (len(values[0]) - 1))
+def _split_at_moves(moves: np.ndarray, first: int, end: int) -> Iterator[tuple[int, int]]:
+    """Split a stand where the body has moved too far for one: (first, end) of each part.
+
+    Args:
+        moves: (N, 4) heading rad, place m and height of the hips in leg lengths.
+        first, end: frames of the stand.
+    """
+    values, most = moves[first:end].tolist(), (_MOST_TURN, _MOST_SHIFT, _MOST_SHIFT, _MOST_SINKING)
     start, lowest, highest = first, values[0], values[0]
     for frame, value in enumerate(values, first):
         lowest, highest = list(map(min, lowest, value)), list(map(max, highest, value))

@@ -9,8 +9,8 @@ import pytest
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.left_out import describe_left_out, find_left_out, measure_speed_classes
-from beyond_mocap.library.loops.standing_loops import LOOP_SECONDS, iter_standing_loops
-from beyond_mocap.library.posture import NormalPostures
+from beyond_mocap.library.loops.standing_loops import LOOP_SECONDS, find_stands, iter_standing_loops
+from beyond_mocap.library.posture import PARTS, NormalPostures
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import Motion, compute_pose, forward_kinematics
@@ -90,6 +90,20 @@ def test_a_stand_is_played_forth_and_back(guarded):
     recorded = next(clip.motion for clip in guarded.clips if clip.path == path and not clip.mirrored)
     fastest = np.abs(np.diff(recorded.root_positions, axis=0)).max() * recorded.fps
     assert np.abs(np.diff(loop.root_positions, axis=0)).max() * loop.fps <= 1.05 * fastest
+
+
+def test_who_gets_ready_to_jump_does_not_stand(guarded):
+    """Played forward and backward, that would be squats."""
+    frames = guarded.frames
+    hips = frames.posture[:, PARTS["hips"]]
+    lower = 0.2 * np.clip((frames.source[:, None] - 60.0) / 60.0, 0.0, 1.0)
+    sinking = replace(frames, posture=np.concatenate([hips - lower, frames.posture[:, PARTS["hips"].stop :]], axis=1))
+    calm, most = np.zeros(len(frames)), {}
+    for name, one in (("stands", frames), ("sinks", sinking)):
+        stands = find_stands(guarded.clips, one, guarded.fps, calm)
+        most[name] = max(end - first for _, first, end in stands)
+        assert all(np.ptp(one.posture[first:end, 0]) < 0.1 for _, first, end in stands)
+    assert most["sinks"] < 0.6 * most["stands"]
 
 
 def test_fights_that_outnumber_walks_are_still_no_locomotion(outnumbered):
