@@ -431,7 +431,7 @@ def test_libraries_that_are_none(run, synthesize, match, clip_file, tmp_path):
     clip_file(folders["two"] / "walk.bvh", 1.4, 2.0)
     other = clip_file(folders["two"] / "child.bvh", 1.4, 1.0)
     other.write_text(STICK)
-    parts = {"empty": [".bvh"], "stand": ["locomotion"], "two": ["child.bvh", "legs"]}
+    parts = {"empty": ["BVH"], "stand": ["locomotion"], "two": ["child.bvh", "legs"]}
     for name, folder in folders.items():
         assert_told(run("library", folder), 2, name, *parts[name])
         assert_told(synthesize(library=folder, annotations=match / "empty.txt"), 2, name, *parts[name])

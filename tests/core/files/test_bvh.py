@@ -412,7 +412,7 @@ def test_a_file_for_which_memory_lacks_is_refused_before_it_is_parsed(tmp_path, 
     monkeypatch.setattr(memory, "read_free_bytes", lambda: 3.0 * len(GOOD))
     bvh.read_bvh(path)  # a small one
     monkeypatch.setattr(bvh_text, "_LARGE_FILE", 0)
-    with pytest.raises(InputError, match="a.bvh: this needs about .* free: cut it into shorter recordings"):
+    with pytest.raises(InputError, match="a.bvh: this needs about .* free; cut it into shorter recordings"):
         bvh.read_bvh(path)
 
 
