@@ -40,12 +40,10 @@ ASKED_SECONDS = 3.0
 _TRAVEL_SPEEDS = np.array([1.6, 2.2, 3.0, 4.5])  # m/s, with the largest angle between heading and travel at each
 _KEEPER_SPEEDS = np.array([3.0, 3.6, 4.4, 5.5])
 _TRAVEL_LIMITS = np.radians([180.0, 60.0, 35.0, 25.0])
-_RUNNING_SPEED = 2.2  # m/s
-_TURNS = 2, 3  # bins per decision below and above it (120 and 180 degrees/s); faster ones snap, with the pelvis' sway
-_SEEN_TURNS = 3, 4  # the same where headings were measured (180 and 240): such turns were real
-_CALM_TURN = 2  # the same towards what is asked (120), at any speed
+_STANDING_TURN, _RUNNING_TURN, _RUNNING_SPEED = 3, 4, 2.2  # bins per decision (180 and 240 degrees/s); m/s
+_CALM_TURN = 2  # the same towards what is asked (120 degrees/s): a body that is held to a faster turn snaps
 _APPROACH = 1.5  # s in which a body turns by 180 degrees that calmly, before and after
-_STEPS = np.arange(-_SEEN_TURNS[1], _SEEN_TURNS[1] + 1)  # bins from one decision to the next
+_STEPS = np.arange(-_RUNNING_TURN, _RUNNING_TURN + 1)  # bins from one decision to the next
 _NEAR_BALL = 2.0  # m; a nearer ball has no bearing, the last one holds
 _FAR_BALL = (25.0, 30.0)  # m between which the way of the ball takes its place
 _BALL_LEAD = 1.0  # s that the way of a far ball is ahead of it
@@ -89,13 +87,11 @@ def weigh_headings(track: SampledTrack, request: HeadingRequest) -> WeighedHeadi
     if at[-1] != count - 1:
         at = np.append(at, count - 1)
     bearings = _compute_bearings(track, request.play, at)
-    plain, plain_steps = _compute_heading_costs(bearings, request.is_keeper), _compute_step_costs(bearings, _TURNS)
+    plain, plain_steps = _compute_heading_costs(bearings, request.is_keeper), _compute_step_costs(bearings)
     costs, steps, is_asked = plain, plain_steps, _find_asked(bearings, request)
     if is_asked.any():
         asked_costs = _compute_asked_costs(bearings, request)
         costs = costs + asked_costs + _measure_key_costs(bearings, request.measured_keys) * bearings.seconds[:, None]
-        is_seen = _find_near(bearings, [(key.time, key.end) for key in request.measured_keys])
-        steps = np.where(is_seen[:, None], _compute_step_costs(bearings, _SEEN_TURNS), plain_steps)
         steps = _limit_turns(bearings, request, steps, asked_costs)
     return WeighedHeadings(times=bearings.times, plain=plain, plain_steps=plain_steps, costs=costs, steps=steps,
                             is_asked=is_asked)
@@ -186,12 +182,7 @@ def _find_asked(bearings: _Bearings, request: HeadingRequest) -> np.ndarray:
     """Find the decisions (D,) bool that what is asked changes; all others stay as they are without it."""
     spans = [span for span in request.spans if _find_quarter(span) is not None or _find_turning_side(span) is not None]
     held = [(pin.time, pin.end) for pin in (*request.keys, *request.measured_keys, *request.gazes)]
-    return _find_near(bearings, [*held, *((span.start, span.end) for span in spans)])
-
-
-def _find_near(bearings: _Bearings, periods: Sequence[tuple[float, float]]) -> np.ndarray:
-    """Find the decisions (D,) bool within ASKED_SECONDS of periods (start, end) s."""
-    starts, ends = np.array(periods).reshape(-1, 2).T
+    starts, ends = np.array([*held, *((span.start, span.end) for span in spans)]).reshape(-1, 2).T
     begun = np.searchsorted(np.sort(starts - ASKED_SECONDS), bearings.times, side="right")
     return begun > np.searchsorted(np.sort(ends + ASKED_SECONDS), bearings.times, side="left")
 
@@ -258,12 +249,12 @@ def _find_inside(bearings: _Bearings, span: Span) -> np.ndarray:
     return (bearings.times >= span.start) & (bearings.times <= span.end)
 
 
-def _compute_step_costs(bearings: _Bearings, turns: tuple[int, int]) -> np.ndarray:
-    """Compute the cost (D, 2 N + 1) of coming to a decision by -N .. N bins; inf beyond `turns`, slow and fast."""
+def _compute_step_costs(bearings: _Bearings) -> np.ndarray:
+    """Compute the cost (D, 2 N + 1) of coming to a decision by -N .. N bins; inf where legs cannot turn so fast."""
     duration, angle = np.roll(bearings.seconds, 1)[:, None], BIN_ANGLE * np.abs(_STEPS)
     rate = angle / np.maximum(duration, 1e-9) / np.pi
     cost = (TURN_COST + TURN_RATE_COST * rate**2) * duration * (_STEPS != 0) + TURN_ANGLE_COST * angle
-    limit = np.where(bearings.speed > _RUNNING_SPEED, turns[1], turns[0])[:, None]
+    limit = np.where(bearings.speed > _RUNNING_SPEED, _RUNNING_TURN, _STANDING_TURN)[:, None]
     return np.where(np.abs(_STEPS) <= limit, cost, np.inf)
 
 
