@@ -92,6 +92,18 @@ def find_runs(flags: np.ndarray) -> list[tuple[int, int]]:
     return list(zip(edges[::2].tolist(), edges[1::2].tolist()))
 
 
+def measure_time_to_nearest(times: np.ndarray, moments: np.ndarray) -> np.ndarray:
+    """Measure how far (T,) times are from the nearest of (M,) moments, before or after; inf without any.
+
+    Args:
+        times: (T,) in any unit.
+        moments: (M,) in the same unit, ascending.
+    """
+    edges = np.concatenate([[-np.inf], moments, [np.inf]])
+    number = np.searchsorted(edges, times)
+    return np.minimum(edges[number] - times, times - edges[number - 1])
+
+
 def drop_short_runs(flags: np.ndarray, least: float) -> np.ndarray:
     """Keep the runs of True of flags (T,) that have at least so many frames."""
     kept = np.zeros_like(flags)

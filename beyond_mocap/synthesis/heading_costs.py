@@ -11,7 +11,7 @@ from ..annotation import LOCOMOTION, Span
 from ..annotation.gaits import STANDING
 from ..annotation.vocabulary import DIRECTIONS, SIDES
 from ..base.easing import smoothstep
-from ..base.time_series import find_runs, interpolate_columns, time_derivative
+from ..base.time_series import find_runs, interpolate_columns, measure_time_to_nearest, time_derivative
 from ..base.vectors import arctan2
 from ..motion import quaternion
 from ..motion.track import SampledTrack, smooth_zero_phase_hann
@@ -267,9 +267,7 @@ def _limit_turns(bearings: _Bearings, request: HeadingRequest, step_costs: np.nd
     is_asked = asked_costs.any(axis=1)
     for span in request.spans:
         is_asked |= _find_inside(bearings, span) & (_find_turning_side(span) is not None)
-    moments = np.concatenate([[-np.inf], bearings.times[is_asked], [np.inf]])
-    number = np.searchsorted(moments, bearings.times)
-    away = np.minimum(moments[number] - bearings.times, bearings.times - moments[number - 1])
+    away = measure_time_to_nearest(bearings.times, bearings.times[is_asked])
     is_fast = (np.abs(_STEPS) > _CALM_TURN) & (away <= _APPROACH)[:, None]
     step_costs = np.where(is_fast, np.inf, step_costs)
     for span in request.spans:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...base.banded_least_squares import BandedLeastSquares
 from ...base.easing import smoothstep
-from ...base.time_series import find_runs
+from ...base.time_series import find_runs, measure_time_to_nearest
 from ...base.vectors import arctan2, measure_lengths
 from ...motion import quaternion
 from ...motion.foot_plant import compute_contact_weights
@@ -175,9 +175,7 @@ def compute_turning_firmness(heel_toe_contacts: np.ndarray, height: np.ndarray, 
     for first, last in find_runs(off):
         if last - first >= _FLIGHT_SECONDS * fps:
             out[first:last] = AIRBORNE_FIRMNESS
-    frames, edges = np.arange(len(out)), np.concatenate([[-np.inf], transitions, [np.inf]])
-    after = np.searchsorted(transitions, frames, side="right")
-    away = np.minimum(frames - edges[after], edges[after + 1] - frames) / fps
+    away = measure_time_to_nearest(np.arange(len(out)), transitions) / fps
     return out * (1.0 + (CUT_FIRMNESS - 1.0) * (1.0 - smoothstep(away, *CUT_REACH)))
 
 

@@ -82,9 +82,9 @@ def test_a_library_without_words_is_built_with_proposed_ones_and_says_so(listed,
     assert bpy.ops.beyond_mocap.build_library() == {"FINISHED"}
     assert len(listed.shown) == 3 and all(clip.words for clip in listed.shown)
     assert all("labels: proposed" in clip.messages.splitlines() for clip in listed.shown)
-    first, told, *_ = bpy.context.scene.beyond_mocap.library_gaps.splitlines()
-    assert re.match(r"\d+ warnings: Proposed labels", first) and told.startswith("labels proposed for 3 clips")
-    assert "--" not in told
+    first, proposed, *_ = bpy.context.scene.beyond_mocap.library_gaps.splitlines()
+    assert re.match(r"\d+ warnings: Proposed labels", first) and proposed.startswith("labels proposed for 3 clips")
+    assert "--" not in proposed
 
 
 def test_what_a_library_lacks_is_shown(listed):

@@ -74,7 +74,7 @@ def test_missed_moments_are_in_the_step_of_synthesize(context):
     ("ball", "Add two players and a pass"), ("path", "Nudging moves points:")])
 def test_a_greyed_button_says_why_in_the_panel(context, name, line):
     scene = bpy.context.scene
-    scene.beyond_mocap_match.players.add().name = "Somebody"
+    scene.beyond_mocap_match.players.add().name = "A player"
     assert any(text.startswith(line) for _, text in draw(find_panel(name), context).drawn)
     fill_scene(scene)
     if name != "path":  # its curve is not in Edit Mode

@@ -113,11 +113,11 @@ def test_messages_name_settings_as_the_command_line_does(line, group, named):
     ("--method distance --no-catch-up --max-blocks 50 --no-made --strength 3", ["--no-made", "--strength"]),
     ("--method baseline --delta 0.5 --strong-foot left", ["--strong-foot"]), ("", []),
 ])
-def test_options_that_the_method_ignores_are_told(line, ignored):
+def test_options_that_the_method_ignores_are_named(line, ignored):
     options = build_parser().parse_args(["synthesize", *FILES, *line.split()])
-    told = describe_ignored_options(options, "synthesis", "player")
-    assert [one.split(":")[0] for one in told] == ignored
-    assert all(f"the method {options.method} does not use it; ignored; use it with " in one for one in told)
+    lines = describe_ignored_options(options, "synthesis", "player")
+    assert [one.split(":")[0] for one in lines] == ignored
+    assert all(f"the method {options.method} does not use it; ignored; use it with " in one for one in lines)
 
 
 def test_a_row_is_on_the_page_of_settings(with_sharpness):

@@ -144,10 +144,10 @@ def test_a_rate_that_shows_no_throw_is_refused():
 
 
 @pytest.mark.parametrize("fps, is_slow", [(30.0, False), (60.0, True)])
-def test_a_ball_that_is_slower_than_requested_is_told(fps, is_slow):
+def test_a_ball_that_is_slower_than_requested_is_named(fps, is_slow):
     thrown = throw_at(read_shipped_model("throw"), ThrowRequest((18.0, 0.0, 1.0), speed=36.0, fps=fps))
-    told = [line for line in thrown.warnings if line == f"the ball leaves at {thrown.speed:.1f} m/s instead of 36.0"]
-    assert (thrown.speed < 0.95 * 36.0) == is_slow == bool(told)
+    named = [line for line in thrown.warnings if line == f"the ball leaves at {thrown.speed:.1f} m/s instead of 36.0"]
+    assert (thrown.speed < 0.95 * 36.0) == is_slow == bool(named)
 
 
 def test_a_ball_faster_than_any_human_throws_is_told():
