@@ -157,7 +157,7 @@ def run_learning(options, reporter: ProgressReporter) -> None:
     from ..library.classify import classifier
     from ..library.classify.examples import read_examples
     from ..library.classify.train import train_classifier
-    from ..library.scan import TABLE_NAME
+    from ..library.folder.annotations import TABLE_NAME
 
     if options.learn and options.learned:
         raise InputError("--learned", "set with --learn", "one of them", "remove one of them")

@@ -203,7 +203,8 @@ def _identify_library_files(library: Path, labels: Path | None) -> set[tuple[int
     """Identify the recordings, labels and balls of a library, also where links lead to them; labels and balls that do
     not exist by their paths, without the table that `labels` becomes.
     """
-    from ..library.scan import TABLE_NAME, find_recordings, list_table_places
+    from ..library.folder.annotations import TABLE_NAME, list_table_places
+    from ..library.folder.recordings import find_recordings
 
     found = find_recordings(library)
     beside = [os.path.splitext(path)[0] + ending for path in found for ending in (".txt", ".ball.csv")]

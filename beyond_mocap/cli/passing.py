@@ -41,7 +41,7 @@ def run_passes(options, reporter: ProgressReporter, writers: Mapping[str, Writer
         writers: further output formats, by file suffix (Blender's).
     """
     from ..library.build import build_library
-    from ..library.scan import find_recordings
+    from ..library.folder.recordings import find_recordings
     from ..passes.passes import build_ball, synthesize_passes
     from ..passes.scene_json import read_scene
 

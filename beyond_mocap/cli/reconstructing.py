@@ -55,7 +55,7 @@ def run_reconstruct(options, reporter: ProgressReporter, writers: Mapping[str, W
         reporter: progress, notes and cancellation.
         writers: further output formats, by file suffix (Blender's).
     """
-    from ..library.label_files import parse_labels
+    from ..library.folder.label_files import parse_labels
 
     if options.model and options.static:
         raise InputError("--model", "set with --static", "one of them", "remove one of them")
@@ -80,7 +80,7 @@ def _reconstruct_trial(options, reporter: ProgressReporter, writers: Mapping[str
                   library=options.add_to)
     write = choose_writer(options.out, writers)
     if options.add_to:
-        from ..library.label_files import find_free_file
+        from ..library.folder.label_files import find_free_file
 
         check_outputs(options.out, find_free_file(options.add_to, options.trial.stem))
     settings = build_settings(options)
@@ -342,7 +342,7 @@ def add_to_library(result, name: str, options) -> list[str]:
     Returns:
         Notes for the user.
     """
-    from ..library.label_files import add_clip
+    from ..library.folder.label_files import add_clip
     from ..markers.recorded_ball import trace_recorded_ball
 
     key = None

@@ -31,23 +31,17 @@ from . import cache
 from .cache import write_synthetic_clips
 from .clip import Clip, RepairFigures
 from .features import FPS, build_frames
+from .folder.annotations import Annotations
+from .folder.conversions import find_readable_clips, read_stamp
+from .folder.label_notes import describe_lone_texts, describe_misspelled_labels, describe_unused_labels
+from .folder.recordings import find_recordings_and_labels
 from .library import RECORDED_INDEX, Library, Progress
 from .recorded_ball.ball_table import find_ball_table
-from .scan import (
-    CLASSIFIER_FILE,
-    Annotations,
-    describe_lone_texts,
-    describe_misspelled_labels,
-    describe_unused_labels,
-    find_readable_clips,
-    find_recordings_and_labels,
-    read_stamp,
-)
 
 if TYPE_CHECKING:
     from .classify.classifier import Classifier
     from .recorded_ball.body_ball import BodyBall
-    from .repair import Repair
+    from .repair import Repair, TPoses
 
 _BASE_BYTES = 1e8  # of memory that a build needs
 _BYTES_PER_BYTE = {".bvh": 4.0, ".npz": 16.0}  # of memory that it needs for a byte of its files: text is longer
@@ -140,7 +134,7 @@ class _Recordings:
     """The recordings of a library and how they are read; see `build_library`.
 
     Attributes:
-        files: what to read for each of `paths` (`scan.Conversions`).
+        files: what to read for each of `paths` (`conversions.Conversions`).
         notes: for the user, so far.
     """
 
@@ -195,7 +189,7 @@ def _list_completed(clips: Iterable[Clip]) -> list[Clip]:
 
 def _find_model(place: Path, annotations: Annotations, paths: list[Path]) -> Path | None:
     """Find the learned model in the cache folder; None where there is none, or where any clip has annotations."""
-    model = place / CLASSIFIER_FILE
+    model = place / cache.CLASSIFIER_FILE
     return model if model.is_file() and not any(annotations.read_rows(path, FPS) for path in paths) else None
 
 
@@ -215,52 +209,98 @@ def _read_clips(recordings: _Recordings, arrays: Path | None, notes: list[str], 
     Returns:
         The clips, and their motions, which let go of memory where they lie in a file.
     """
-    from ..appearance.arm_clearance import ArmClearance
     from .recorded_ball.contact_keys import move_keys_to_contacts
-    from .repair import TPoses, describe_repairs
-    from .synthetic_clips import sample_each_second
+    from .repair import describe_repairs
 
-    levelled, changes, t_poses = MotionWriter(arrays and arrays / "levelled.npy"), [], TPoses()
-    units: list[str] = []
-    seen: list[BodyBall | None] = []
-    for (source_notes, motion, pops, drift, ball), path in zip(_iter_levelled(recordings, report, cancelled),
-                                                               recordings.paths):
-        units += source_notes
-        read_rows = partial(recordings.annotations.read_rows, path, motion.fps)
-        levelled.append(t_poses.add_recording(path, motion, read_rows))
-        changes.append((pops, drift))
-        seen.append(ball)
-    t_poses.check(recordings.folder)
-    notes += _collect_unit_notes(units)
-    motions = levelled.finish()
-    rows = _read_rows(recordings, motions, notes)
+    levelled, repaired = (MotionWriter(arrays and arrays / f"{name}.npy") for name in ("levelled", "repaired"))
+    read = _level_recordings(recordings, levelled, notes, report, cancelled)
+    rows = _read_rows(recordings, read.motions, notes)
     is_proposed = not any(rows)
-    repaired = MotionWriter(arrays and arrays / "repaired.npy")
-    repairs, contacts = _repair_clips(recordings, motions, [drift for _, drift in changes], repaired, notes=notes,
-                                      report=report, cancelled=cancelled)
+    repairs, contacts = _repair_clips(recordings, read.motions, read.drifts, repaired, notes=notes, report=report,
+                                      cancelled=cancelled)
     levelled.discard()
-    motions = repaired.finish()
+    motions, t_poses = repaired.finish(), read.t_poses
     if is_proposed:
         rows = _propose_rows(recordings, motions, t_poses.frames, report, cancelled)
-    rows = t_poses.cut_rows(rows)
-    balls = [None if ball is None else ball.place(motion) for ball, motion in zip(seen, motions)]
-    rows = move_keys_to_contacts(motions, balls, rows, notes)
-    notes += t_poses.describe()
-    notes += describe_repairs([(one, pops) for one, (pops, _) in zip(repairs, changes)])
-    figures = [RepairFigures(pops, one.drift, *one.slide) for one, (pops, _) in zip(repairs, changes)]
-    arms = ArmClearance(sample_each_second(one for one, is_shown in zip(motions, t_poses.is_shown) if is_shown))
-    complete = MotionWriter(arrays and arrays / cache.MOTIONS)
+    balls = [None if ball is None else ball.place(motion) for ball, motion in zip(read.balls, motions)]
+    rows = move_keys_to_contacts(motions, balls, t_poses.cut_rows(rows), notes)
+    notes += [*t_poses.describe(), *describe_repairs(list(zip(repairs, read.pop_counts)))]
+    found = zip(_iter_completed(recordings, motions, rows, contacts, notes), repairs, read.pop_counts, balls,
+                t_poses.frames)
+    originals = (replace(clip, repair_figures=RepairFigures(pops, repair.drift, *repair.slide), ball=ball,
+                         has_proposed_labels=is_proposed, t_pose_frames=frames)
+                 for clip, repair, pops, ball, frames in found)
+    shown = (motion for motion, is_shown in zip(motions, t_poses.is_shown) if is_shown)
+    clips, finished = _write_clips(originals, shown, MotionWriter(arrays and arrays / cache.MOTIONS), notes, cancelled)
+    repaired.discard()
+    return clips, finished
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Levelled:
+    """Recordings without pops and drift, on their own skeletons.
+
+    Attributes:
+        motions: theirs.
+        pop_counts: number of pops that were removed from each.
+        drifts: metres by which the floor of each rose or sank.
+        balls: theirs; None for recordings without one.
+        t_poses: theirs.
+    """
+
+    motions: Sequence[Motion]
+    pop_counts: list[int]
+    drifts: list[float]
+    balls: list[BodyBall | None]
+    t_poses: TPoses
+
+
+def _level_recordings(recordings: _Recordings, levelled: MotionWriter, notes: list[str], report: Progress,
+                      cancelled) -> _Levelled:
+    """Read all recordings into `levelled`, without their T-poses; notes get the readers' lines.
+
+    Raises:
+        InputError: if a recording has no legs, or none shows more than a T-pose.
+    """
+    from .repair import TPoses
+
+    t_poses, unit_notes, changes = TPoses(), [], []
+    for path, (source_notes, motion, *change) in zip(recordings.paths, _iter_levelled(recordings, report, cancelled)):
+        unit_notes += source_notes
+        read_rows = partial(recordings.annotations.read_rows, path, motion.fps)
+        levelled.append(t_poses.add_recording(path, motion, read_rows))
+        changes.append(change)
+    t_poses.check(recordings.folder)
+    notes += _collect_unit_notes(unit_notes)
+    pop_counts, drifts, balls = (list(column) for column in zip(*changes))
+    return _Levelled(motions=levelled.finish(), pop_counts=pop_counts, drifts=drifts, balls=balls, t_poses=t_poses)
+
+
+def _write_clips(originals: Iterable[Clip], shown: Iterable[Motion], complete: MotionWriter, notes: list[str],
+                 cancelled) -> tuple[list[Clip], Sequence[Motion]]:
+    """Write the motions of clips and of their twins, with arms outside the trunk.
+
+    Args:
+        originals: the clips.
+        shown: motions that show how arms hang.
+        complete: where to write.
+        notes: get a line about the arms.
+        cancelled: asked for each clip.
+    Returns:
+        Clips and twins with the written motions, and these.
+    """
+    from ..appearance.arm_clearance import ArmClearance
+    from .synthetic_clips import sample_each_second
+
+    arms = ArmClearance(sample_each_second(shown))
     known: list[dict] = []  # all of a clip but its motion
-    for original, what, ball, frames in zip(_iter_completed(recordings, motions, rows, contacts, notes), figures, balls,
-                                            t_poses.frames):
+    for original in originals:
         _check_cancelled(cancelled)
-        original = replace(original, motion=arms.clear(original.motion), repair_figures=what, ball=ball,
-                           has_proposed_labels=is_proposed, t_pose_frames=frames)
-        for clip in (original, original.build_twin()):
+        cleared = replace(original, motion=arms.clear(original.motion))
+        for clip in (cleared, cleared.build_twin()):
             complete.append(clip.motion)
             known.append({name: value for name, value in vars(clip).items() if name != "motion"})
     notes += arms.describe()
-    repaired.discard()
     finished = complete.finish()
     return [Clip(motion=motion, **rest) for motion, rest in zip(finished, known)], finished
 

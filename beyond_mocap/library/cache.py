@@ -37,12 +37,15 @@ from ..motion.skeleton import Skeleton
 from .clip import Clip, RepairFigures
 from .coverage import Coverage
 from .features import Frames, list_frame_arrays
-from .scan import CACHE_FOLDER, read_stamp
+from .folder.conversions import read_stamp
+from .folder.recordings import CACHE_FOLDER
 
 # raised whenever what is computed or stored changes, so that old caches are not used
 VERSION = 48
 MOTIONS = "motions.npy"
 """Name of the file with the motions of all clips (`files.motion_file`)."""
+CLASSIFIER_FILE = "learned_words.npz"
+"""Name of the learned classifier of labels in the cache's folder."""
 _DIGESTS, _COVERAGE = "digests.json", "coverage"
 _SETTLED = 2_000_000_000  # ns since a file's last change from which on its time tells the next one
 _TOKEN_BYTES = 6  # of the part of a folder's name that makes it unique

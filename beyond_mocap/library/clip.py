@@ -9,7 +9,7 @@ import numpy as np
 from ..annotation import ClipAnnotation, swap_sides
 from ..motion.mirror import mirror
 from ..motion.motion import Motion
-from .scan import CACHE_FOLDER
+from .folder.recordings import CACHE_FOLDER
 
 SYNTHETIC_FOLDER, LANDING_FOLDER = f"{CACHE_FOLDER}/made-gait/", f"{CACHE_FOLDER}/made-landing/"
 """Below a library: synthetic clips, and recordings that end in flight with their synthetic end."""

@@ -21,7 +21,7 @@ from ..motion.motion import Motion
 from ..motion.retargeting.retarget import Retargeter
 from ..motion.skeleton import Skeleton
 from . import repair
-from .scan import Conversions
+from .folder.conversions import Conversions
 
 if TYPE_CHECKING:
     from .library import Library

@@ -18,8 +18,10 @@ from ..base.content import open_file
 from ..base.errors import InputError
 from . import cache
 from .clip import Clip
+from .folder.annotations import Annotations
+from .folder.conversions import Conversions, is_foreign
+from .folder.recordings import list_own_recordings
 from .library import Library
-from .scan import Annotations, Conversions, is_foreign, list_own_recordings
 
 GOOD, FAIR, POOR, UNKNOWN = range(4)
 # m/s by which heels and toes in contact slide: fair and poor from sqrt(a^2 + (b v)^2) on at the speed v, as feet roll

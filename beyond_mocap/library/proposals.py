@@ -31,7 +31,7 @@ from ..motion.humanoid import Humanoid, compute_heading_from_positions, identify
 from ..motion.motion import Motion, forward_kinematics
 from ..motion.supports import GRAVITY
 from ..motion.t_poses import find_t_poses
-from .label_sources import Proposal
+from .folder.label_sources import Proposal
 from .library import Library
 
 if TYPE_CHECKING:

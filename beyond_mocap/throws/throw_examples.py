@@ -18,8 +18,9 @@ from ..ball.flight import find_wall_impact
 from ..ball.physics import BASEBALL, FOOTBALL
 from ..base.errors import BeyondMocapError, InputError, UserCancelledError, format_count
 from ..files.bvh import bvh
-from ..library.scan import TABLE_NAME as ANNOTATIONS_NAME
-from ..library.scan import Annotations, find_clips
+from ..library.folder.annotations import TABLE_NAME as ANNOTATIONS_NAME
+from ..library.folder.annotations import Annotations
+from ..library.folder.recordings import find_clips
 from ..motion import quaternion
 from ..motion.humanoid import Humanoid, identify_joints
 from ..motion.motion import (

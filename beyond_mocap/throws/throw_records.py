@@ -15,7 +15,7 @@ from ..ball.physics import BASEBALL, FOOTBALL, Ball
 from ..base.content import read_bytes
 from ..base.errors import InputError
 from ..files.tables import parse_number, read_rows
-from ..library.scan import Annotations
+from ..library.folder.annotations import Annotations
 from .networks.chains import EFFECTORS as LIMBS
 
 TABLE_NAME = "throws.csv"

@@ -9,7 +9,8 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from ...beyond_mocap.base.errors import InputError, UserCancelledError, format_count
 from ...beyond_mocap.files.clip_file import CLIP_ENDINGS, FOREIGN, read_clip
-from ...beyond_mocap.library import scan
+from ...beyond_mocap.library.folder import conversions
+from ...beyond_mocap.library.folder import recordings as folder_recordings
 from ...beyond_mocap.motion import humanoid, quaternion
 from ...beyond_mocap.motion import mirror as mirroring
 from ...beyond_mocap.motion import motion as motions
@@ -69,7 +70,7 @@ the motion, from the hips up and in metres"""
 
     def read_file(self, path: Path) -> "list[tuple[str, BvhClip]]":
         """Read the clips of one file with their names."""
-        if not scan.is_foreign(path):
+        if not conversions.is_foreign(path):
             return [(path.stem, read_clip(path, self.unit or None))]
         takes = foreign.read_takes(path)
         alone = len(takes) == 1
@@ -86,7 +87,7 @@ the motion, from the hips up and in metres"""
 
 
 def _list_clips_below(folder: Path) -> list[Path]:
-    found = scan.find_recordings(folder)
+    found = folder_recordings.find_recordings(folder)
     if not found:
         raise InputError(folder, "no motion clip in the folder", "BVH, FBX, glTF or USD files", "choose another folder")
     return found
@@ -223,7 +224,7 @@ kind, in this file or as a .blend for a folder of asset libraries"""
     @staticmethod
     def run_job(order, progress, cancelled, _hurry):
         """Read the motions and render the pictures."""
-        from ...beyond_mocap.library.label_files import read_labels
+        from ...beyond_mocap.library.folder.label_files import read_labels
 
         drafts, pictures, total = [], [], len(order.files) + len(order.drafts)
         for number, (path, file, unit, figures) in enumerate(order.files):

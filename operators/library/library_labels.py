@@ -35,7 +35,7 @@ the NLA editor; Save Labels writes them to the library"""
 
     def do(self, context):
         """Read clip and labels, then create armature and strips."""
-        from ...beyond_mocap.library.label_files import read_labels, read_sources, to_timeline
+        from ...beyond_mocap.library.folder.label_files import read_labels, read_sources, to_timeline
 
         settings, path = context.scene.beyond_mocap, self.find_clip(context)
         motion, _ = recordings.read_recording(settings, path)
@@ -70,7 +70,7 @@ headers, turns, getting up, and acts learned from annotated clips"""
         """Read the recording, then write the strips."""
         from ...beyond_mocap.annotation import Timeline
         from ...beyond_mocap.library.classify import classifier
-        from ...beyond_mocap.library.label_files import to_timeline
+        from ...beyond_mocap.library.folder.label_files import to_timeline
         from ...beyond_mocap.library.proposals import GAITS, list_gaits, propose_labels
 
         settings, rig = context.scene.beyond_mocap, context.object
@@ -262,7 +262,7 @@ table; existing labels are replaced only after you confirm"""
     def invoke(self, context, event):
         """Ask before existing labels are replaced."""
         from ...beyond_mocap.base.errors import InputError
-        from ...beyond_mocap.library.label_files import find_label_file, has_labels
+        from ...beyond_mocap.library.folder.label_files import find_label_file, has_labels
 
         rig = context.object
         clip, folder = recordings.find_source_file(rig)
@@ -281,7 +281,7 @@ table; existing labels are replaced only after you confirm"""
 
     def do(self, context):
         """Read the strips, write the file, and update the list."""
-        from ...beyond_mocap.library.label_files import write_labels
+        from ...beyond_mocap.library.folder.label_files import write_labels
 
         rig = context.object
         rows = recordings.read_labels(rig)
@@ -330,13 +330,13 @@ others; the result is a file that works with any library"""
     @staticmethod
     def run_job(order, progress, cancelled, _hurry):
         """Read the clips, train and write the classifier; returns the file and lines about what was learned."""
-        from ...beyond_mocap.library import cache, scan
+        from ...beyond_mocap.library import cache
         from ...beyond_mocap.library.classify import classifier
         from ...beyond_mocap.library.classify.examples import read_examples
         from ...beyond_mocap.library.classify.train import train_classifier
 
         out = Path(order.out) if order.out else cache.find_cache_folder(Path(order.folder),
-                                                                        order.cache)[0] / scan.CLASSIFIER_FILE
+                                                                        order.cache)[0] / cache.CLASSIFIER_FILE
         on_progress = lambda done, text: progress(0.7 * done, text)  # noqa: E731
         notes = []
         examples = read_examples(order.folder, order.unit, on_progress, cache_dir=order.cache, cancelled=cancelled,

@@ -240,8 +240,9 @@ def _iter_files(folder: str):
     """Iterate over the paths of all recordings and label files below a folder; links are followed, each folder once."""
     from ...beyond_mocap.files.clip_file import CLIP_ENDINGS, FOREIGN, is_clip_file
     from ...beyond_mocap.files.file_names import identify_file
+    from ...beyond_mocap.library.folder.annotations import TABLE_NAME
+    from ...beyond_mocap.library.folder.recordings import CACHE_FOLDER
     from ...beyond_mocap.library.recorded_ball.ball_table import ENDING
-    from ...beyond_mocap.library.scan import CACHE_FOLDER, TABLE_NAME
 
     wanted, seen = (*CLIP_ENDINGS, ".txt", TABLE_NAME, ENDING, *FOREIGN), set()
     for here, folders, files in os.walk(folder, followlinks=True):

@@ -92,7 +92,8 @@ class ConversionQueue:
     def __init__(self, folder: str | Path, cache_dir: str | None):
         """Find the recordings below `folder` that need a conversion; InputError where there is no folder."""
         from ...beyond_mocap.library import cache
-        from ...beyond_mocap.library.scan import Conversions, list_own_recordings
+        from ...beyond_mocap.library.folder.conversions import Conversions
+        from ...beyond_mocap.library.folder.recordings import list_own_recordings
 
         folder = Path(folder)
         self.conversions = Conversions(folder, cache.find_cache_folder(folder, cache_dir)[0])
@@ -101,7 +102,7 @@ class ConversionQueue:
 
     def convert_next(self) -> None:
         """Convert the next one; one that cannot be converted is noted and skipped."""
-        from ...beyond_mocap.library.scan import read_stamp
+        from ...beyond_mocap.library.folder.conversions import read_stamp
 
         path = self.remaining.pop(0)
         stamp = read_stamp(path)  # before it is read: a file that changes meanwhile is converted again

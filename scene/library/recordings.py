@@ -49,7 +49,7 @@ def find_clip_file(settings, path: str, folder: str = "") -> tuple[Path, float |
         InputError: if the file is missing or not converted yet.
     """
     from ...beyond_mocap.library import cache
-    from ...beyond_mocap.library.scan import Conversions, is_foreign
+    from ...beyond_mocap.library.folder.conversions import Conversions, is_foreign
 
     library_folder = Path(to_absolute_path(folder)) if folder else find_library_folder(settings)
     file = library_folder / path
@@ -113,7 +113,7 @@ def read_labels(rig: bpy.types.Object) -> tuple[ClipAnnotation, ...]:
 
 def read_labels_at(rig: bpy.types.Object, fps: float, count: int) -> tuple[ClipAnnotation, ...]:
     """Read an armature's strips in frames of a motion of `count` frames at `fps`; InputError as `read_labels`."""
-    from ...beyond_mocap.library.label_files import limit_rows
+    from ...beyond_mocap.library.folder.label_files import limit_rows
 
     timeline = lanes.read_timeline(rig, f"strips of {rig.name}")
     rows = limit_rows(build_clip_annotations(timeline, fps), count) if timeline is not None else ()

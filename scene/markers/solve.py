@@ -114,7 +114,7 @@ def find_clip_path(scene: bpy.types.Scene, name: str) -> Path:
     """Find a free path for the clip in the library folder; raise InputError without a folder, or where the name is
     taken.
     """
-    from ...beyond_mocap.library.label_files import find_free_file
+    from ...beyond_mocap.library.folder.label_files import find_free_file
 
     folder = require_library_folder(scene.beyond_mocap)
     sample.check_not_sample(folder)
@@ -178,7 +178,7 @@ def add_to_library(request: ReconstructionRequest, reconstruction: "Reconstructi
     """Write the clip and its labels to the library, if requested; return messages."""
     if request.add is None:
         return []
-    from ...beyond_mocap.library.label_files import add_clip
+    from ...beyond_mocap.library.folder.label_files import add_clip
     from ...beyond_mocap.markers.recorded_ball import trace_recorded_ball
 
     throw = reconstruction.release is not None and any(word.startswith("throw") for word in request.words)

@@ -17,7 +17,7 @@ from . import label_tracks as lanes
 from . import strip_writing as lay_strips
 
 if TYPE_CHECKING:
-    from ...beyond_mocap.library.label_sources import Proposal, Sources
+    from ...beyond_mocap.library.folder.label_sources import Proposal, Sources
 
 SAME_SECONDS = 0.1
 """Seconds within which two key moments are the same one."""
@@ -112,7 +112,7 @@ def to_row(one: BeyondMocapProposal) -> "annotation.ClipAnnotation":
 
 def accept_proposal(target: bpy.types.Object, index: int) -> str:
     """Add a proposal to the clip's labels, unless it was accepted before. Returns a line for the user."""
-    from ...beyond_mocap.library.label_files import to_timeline
+    from ...beyond_mocap.library.folder.label_files import to_timeline
 
     one = _find_proposal(target, index)
     if one.state != "ACCEPTED":

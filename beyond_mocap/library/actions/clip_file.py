@@ -15,7 +15,7 @@ from ...files.piece_file import check_array, load_piece_file, write_piece_file
 from ...motion.motion import Motion
 from ...motion.skeleton import Skeleton
 from ..clip import SYNTHETIC_FPS, Clip
-from ..scan import CACHE_FOLDER
+from ..folder.recordings import CACHE_FOLDER
 
 _NAMES = ("key", "fps", "rows")
 _UNIT_TOLERANCE = 1e-6  # by which the square of a rotation's length may differ from 1

@@ -21,7 +21,7 @@ from ...base.time_series import find_runs
 from ...files.atomic import atomic_write
 from ...files.plain_npz import HEADER, read_own_arrays
 from ...motion.motion import Motion
-from ..label_sources import LEARNED, Proposal
+from ..folder.label_sources import LEARNED, Proposal
 from .details import Details
 from .kernel import Kernel, compute_confidence
 from .signals import LENGTH, RATE, STRIKES, Signals, Space, build_signals, build_windows

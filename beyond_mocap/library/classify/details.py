@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...annotation.labels import GROUPS, list_labels
-from ..label_sources import Proposal
+from ..folder.label_sources import Proposal
 
 EXCLUSIVE = tuple(list_labels(group=group) for group in GROUPS)
 """Groups of labels of which an act has one at most; any other label is present or not."""

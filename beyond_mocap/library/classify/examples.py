@@ -13,7 +13,7 @@ from ...annotation.labels import list_labels
 from ...base.errors import InputError, UserCancelledError
 from ...motion.humanoid import identify_joints
 from ...motion.motion import Motion
-from ..label_sources import Proposal, is_unreviewed
+from ..folder.label_sources import Proposal, is_unreviewed
 from ..proposals import GAITS, propose_labels
 from .signals import Signals, build_signals
 
@@ -105,7 +105,8 @@ class _ClipReader:
 
     def __init__(self, folder: str | Path, cache_dir):
         from .. import cache
-        from ..scan import Annotations, find_readable_clips
+        from ..folder.annotations import Annotations
+        from ..folder.conversions import find_readable_clips
 
         self._folder, self.unreviewed_count = Path(folder), 0
         place = cache.find_cache_folder(self._folder, cache_dir)[0]

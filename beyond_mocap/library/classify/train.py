@@ -15,7 +15,7 @@ from ...annotation import swap_sides
 from ...annotation.labels import find_label
 from ...base.errors import InputError, format_count
 from ...base.optional_packages import import_optional
-from ..label_sources import Proposal
+from ..folder.label_sources import Proposal
 from .classifier import (
     Act,
     Classifier,

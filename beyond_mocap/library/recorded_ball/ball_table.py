@@ -14,7 +14,7 @@ def find_ball_table(path: Path, file: Path) -> Path | None:
 
     Args:
         path: the recording.
-        file: what is read in its place (`scan.Conversions`).
+        file: what is read in its place (`conversions.Conversions`).
     Returns:
         The table beside the recording, else that of its conversion, else None.
     """

@@ -14,8 +14,8 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...library.clip import LANDING_FOLDER, SYNTHETIC_FOLDER, SYNTHETIC_FPS
+from ...library.folder.recordings import CACHE_FOLDER
 from ...library.library import Library
-from ...library.scan import CACHE_FOLDER
 from ...motion import contacts as foot_contacts
 from ...motion.humanoid import Humanoid, identify_joints
 from ...motion.motion import Motion, forward_kinematics

@@ -31,8 +31,8 @@ def library(tmp_path):
 
 
 def rows_of(core, clip):
-    scan = core("library.scan")
-    return scan.Annotations(clip.parent, [clip]).read_rows(clip, core("files.bvh.bvh").read_bvh(clip).motion.fps)
+    annotations = core("library.folder.annotations")
+    return annotations.Annotations(clip.parent, [clip]).read_rows(clip, core("files.bvh.bvh").read_bvh(clip).motion.fps)
 
 
 @pytest.mark.parametrize("fps, base", [(24, 1.001), (25, 1.0), (30, 1.0), (60, 1.0)])

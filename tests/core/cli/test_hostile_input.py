@@ -17,7 +17,7 @@ from beyond_mocap.cli.main import build_parser, main
 from beyond_mocap.cli.outputs import check_outputs
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.files.file_names import avoid_reserved_name
-from beyond_mocap.library import scan
+from beyond_mocap.library.folder import recordings
 
 TOP = Path(__file__).resolve().parents[3]
 SAMPLE_LIBRARY = TOP / "sample_blend" / "library"
@@ -192,8 +192,8 @@ def test_the_library_is_listed_once_for_all_outputs_that_exist(tmp_path, monkeyp
     outputs = [tmp_path / name for name in ("a.bvh", "b.json", "c.csv")]
     for path in outputs:
         path.touch()
-    folders, find = [], scan.find_recordings
-    monkeypatch.setattr(scan, "find_recordings", lambda folder: folders.append(folder) or find(folder))
+    folders, find = [], recordings.find_recordings
+    monkeypatch.setattr(recordings, "find_recordings", lambda folder: folders.append(folder) or find(folder))
     check_outputs(*outputs, None, library=SAMPLE_LIBRARY)
     check_outputs(tmp_path / "new.bvh", library=SAMPLE_LIBRARY)
     assert folders == [SAMPLE_LIBRARY]
@@ -213,7 +213,7 @@ def test_where_files_have_no_numbers_outputs_and_folders_are_told_apart_by_their
         return os.stat_result(fields)
 
     monkeypatch.setattr(os, "stat", stat_without_number)
-    assert {path.parent.name for path in scan.find_recordings(tmp_path)} >= {"one", "two"}
+    assert {path.parent.name for path in recordings.find_recordings(tmp_path)} >= {"one", "two"}
     check_outputs(tmp_path / "out.bvh", library=tmp_path / "one")
     with pytest.raises(InputError, match="is a file of the library"):
         check_outputs(tmp_path / "link.bvh", library=tmp_path / "two")

@@ -11,7 +11,7 @@ from beyond_mocap.evaluation.reference import reference_cache
 from beyond_mocap.evaluation.report import evaluate
 from beyond_mocap.library import synthetic_clips
 from beyond_mocap.library.build import build_library
-from beyond_mocap.library.scan import CACHE_FOLDER
+from beyond_mocap.library.folder.recordings import CACHE_FOLDER
 
 FPS = 30.0
 

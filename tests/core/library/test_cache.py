@@ -15,12 +15,13 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files import motion_file
-from beyond_mocap.library import build, cache, scan, synthetic_clips
+from beyond_mocap.library import build, cache, synthetic_clips
 from beyond_mocap.library import library as library_module
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.features import list_frame_arrays
+from beyond_mocap.library.folder import label_notes
+from beyond_mocap.library.folder.recordings import CACHE_FOLDER
 from beyond_mocap.library.library import Library
-from beyond_mocap.library.scan import CACHE_FOLDER
 
 TOP = Path(__file__).resolve().parents[3]
 
@@ -231,7 +232,7 @@ def test_a_cache_of_an_earlier_version_is_told_and_replaced(folder):
 def test_a_cache_of_a_program_that_knew_a_label_names_it_as_misspelled_when_it_is_opened(folder, monkeypatch):
     (folder / "walk.txt").write_text("0 1.4 waking\n")
     with monkeypatch.context() as earlier:
-        earlier.setattr(scan, "find_meant_label", lambda *_: "")
+        earlier.setattr(label_notes, "find_meant_label", lambda *_: "")
         assert not any("waking" in note for note in built(folder)[0].notes)
     for _ in range(2):
         library, worked = built(folder)

@@ -8,7 +8,7 @@ import pytest
 from beyond_mocap.annotation import build_clip_annotations, parse_timeline, read_clip_annotations
 from beyond_mocap.annotation.text import format_timeline
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.library.label_files import to_timeline
+from beyond_mocap.library.folder.label_files import to_timeline
 from beyond_mocap.library.proposals import GAITS, propose_labels
 from beyond_mocap.motion.mirror import mirror
 from beyond_mocap.motion.motion import place_motion, resample

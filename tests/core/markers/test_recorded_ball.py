@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.library.build import build_library
-from beyond_mocap.library.label_files import add_clip
+from beyond_mocap.library.folder.label_files import add_clip
 from beyond_mocap.markers.files.marker_files import read_markers
 from beyond_mocap.markers.reconstruct import ReconstructSettings, reconstruct
 from beyond_mocap.markers.recorded_ball import trace_recorded_ball

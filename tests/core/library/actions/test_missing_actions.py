@@ -16,6 +16,7 @@ from beyond_mocap.base.errors import InputError, NotInLibraryError
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library import features, missing_actions, synthetic_clips
 from beyond_mocap.library.build import build_library
+from beyond_mocap.library.folder.recordings import CACHE_FOLDER
 from beyond_mocap.library.missing_actions import (
     ActionMoment,
     add_actions,
@@ -28,7 +29,6 @@ from beyond_mocap.library.missing_actions import (
     list_action_labels,
     select_own_kicks,
 )
-from beyond_mocap.library.scan import CACHE_FOLDER
 from beyond_mocap.motion.humanoid import identify_joints
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import Track

@@ -7,7 +7,7 @@ import pytest
 from beyond_mocap.annotation import ClipAnnotation
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.library import label_files as keep_words
-from beyond_mocap.library.scan import Annotations
+from beyond_mocap.library.folder.annotations import Annotations
 
 ROWS = (
     ClipAnnotation(0, 195, None, ("walking", "front")),

@@ -14,8 +14,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..annotation import ClipAnnotation, build_clip_annotations, parse_timeline
-from ..annotation.text import read_text
+from ...annotation import ClipAnnotation, build_clip_annotations, parse_timeline
+from ...annotation.text import read_text
 
 RULES, LEARNED = "rules", "learned"
 

@@ -4,7 +4,7 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.library.build import build_library
-from beyond_mocap.library.label_files import add_clip
+from beyond_mocap.library.folder.label_files import add_clip
 from beyond_mocap.synthetic.gait import build_gait
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from beyond_mocap.annotation import ClipAnnotation
-from beyond_mocap.library.label_files import format_rows, read_labels, read_sources, write_labels
+from beyond_mocap.library.folder.label_files import format_rows, read_labels, read_sources, write_labels
 
 ROWS = (
     ClipAnnotation(0, 80, None, ("jogging", "front")), ClipAnnotation(60, 90, 75, ("kick", "right", "low")),

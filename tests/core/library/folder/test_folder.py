@@ -8,16 +8,11 @@ import pytest
 from beyond_mocap.annotation import ClipAnnotation
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.library.build import build_library
+from beyond_mocap.library.folder.annotations import Annotations
+from beyond_mocap.library.folder.conversions import find_readable_clips
+from beyond_mocap.library.folder.label_notes import describe_misspelled_labels, describe_unused_labels
+from beyond_mocap.library.folder.recordings import find_clips, find_recordings_and_labels, list_own_recordings
 from beyond_mocap.library.listing import scan_clips
-from beyond_mocap.library.scan import (
-    Annotations,
-    describe_misspelled_labels,
-    describe_unused_labels,
-    find_clips,
-    find_readable_clips,
-    find_recordings_and_labels,
-    list_own_recordings,
-)
 
 HEADER = "file,fps,start_frame,end_frame,key_frame,labels,comment\n"
 

@@ -13,19 +13,19 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..annotation import ClipAnnotation, KeyMoment, Span, Timeline, read_annotation_csv
-from ..annotation.text import read_text
-from ..annotation.timeline import check_labels
-from ..annotation.vocabulary import list_vocabulary
-from ..base.errors import InputError
-from ..files.atomic import atomic_write
-from ..files.bvh import bvh
-from ..files.tables import write_ball
-from ..motion.motion import Motion
-from ..motion.track.ball_path import BallPath
+from ...annotation import ClipAnnotation, KeyMoment, Span, Timeline, read_annotation_csv
+from ...annotation.text import read_text
+from ...annotation.timeline import check_labels
+from ...annotation.vocabulary import list_vocabulary
+from ...base.errors import InputError
+from ...files.atomic import atomic_write
+from ...files.bvh import bvh
+from ...files.tables import write_ball
+from ...motion.motion import Motion
+from ...motion.track.ball_path import BallPath
+from ..recorded_ball.ball_table import ENDING
+from .annotations import TABLE_NAME, Annotations
 from .label_sources import Sources, format_cells, format_comment, read_table_sources, read_text_sources
-from .recorded_ball.ball_table import ENDING
-from .scan import TABLE_NAME, Annotations
 
 TEXT, TABLE = "TEXT", "TABLE"
 

@@ -8,8 +8,9 @@ import pytest
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.cache import find_cache_folder
+from beyond_mocap.library.folder.conversions import Conversions, read_stamp
+from beyond_mocap.library.folder.recordings import list_own_recordings
 from beyond_mocap.library.listing import scan_clips
-from beyond_mocap.library.scan import Conversions, list_own_recordings, read_stamp
 
 
 @pytest.fixture

@@ -1,0 +1,1 @@
+"""A library's folder: its recordings, their labels, and what is not used of both."""
