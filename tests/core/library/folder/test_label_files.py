@@ -6,7 +6,7 @@ import pytest
 
 from beyond_mocap.annotation import ClipAnnotation
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.library import label_files as keep_words
+from beyond_mocap.library.folder import label_files
 from beyond_mocap.library.folder.annotations import Annotations
 
 ROWS = (
@@ -26,7 +26,7 @@ def clip(tmp_path):
 
 
 def keep(clip, rows=ROWS, **how):
-    return keep_words.write_labels(clip, clip.parents[1], rows, 120.0, **how)
+    return label_files.write_labels(clip, clip.parents[1], rows, 120.0, **how)
 
 
 def read(clip):
@@ -78,13 +78,13 @@ def test_there_and_back_through_seconds():
     from beyond_mocap.annotation import build_clip_annotations
 
     for fps in (120.0, 59.94, 30.0):
-        assert build_clip_annotations(keep_words.to_timeline(ROWS, fps), fps) == ROWS
+        assert build_clip_annotations(label_files.to_timeline(ROWS, fps), fps) == ROWS
 
 
 def test_rows_are_cut_to_the_clip():
     rows = (ClipAnnotation(-5, 40, None, ("walking",)), ClipAnnotation(90, 140, 135, ("kick",)),
             ClipAnnotation(80, 140, None, ("jogging",)))
-    assert keep_words.limit_rows(rows, 100) == (ClipAnnotation(0, 40, None, ("walking",)),
+    assert label_files.limit_rows(rows, 100) == (ClipAnnotation(0, 40, None, ("walking",)),
                                                 ClipAnnotation(80, 99, None, ("jogging",)))
 
 
