@@ -13,6 +13,7 @@ import numpy as np
 from ..base.time_series import find_runs
 from ..motion.contacts import measure_floor_height
 from ..motion.humanoid import compute_heading_from_positions, split_joint_name
+from ..motion.motion import ACCEPTED_RATES
 from ..motion.quaternion import from_up_angle, rotate
 from ..motion.track import BALL_RADIUS
 from ..synthesis.quality import movement
@@ -80,7 +81,7 @@ def draw_clips(view: View) -> bytes:
     rate = np.append(compute_playback_rate(*view.source), np.nan)
     rate[view.transitions - 1] = np.nan
     warp.plot(view.played.times, rate, color=MIDDLE, lw=1)
-    for limit in (0.85, 1.15):
+    for limit in ACCEPTED_RATES:
         warp.axhline(limit, color="#999999", lw=0.8, ls="--")
     _draw_title(warp, "playback rate", "played / recorded")
     _mark_moments(warp, view)
@@ -233,7 +234,8 @@ def _draw_speed(ax, view: View) -> None:
         ax.plot(times, movement.measure_travel_speed(view.target, view.fps), color="#8fb8de", lw=3, label="track")
     ax.plot(times, view.speed, color=MIDDLE, lw=1, label="played")
     if view.reference is not None and np.isfinite(view.reference.fastest):
-        ax.axhline(1.15 * view.reference.fastest, color=RIGHT, lw=0.8, ls="--", label="fastest recording x 1.15")
+        ax.axhline(ACCEPTED_RATES[1] * view.reference.fastest, color=RIGHT, lw=0.8, ls="--",
+                   label=f"fastest recording x {ACCEPTED_RATES[1]}")
     ax.set_ylim(bottom=0.0)
     _draw_title(ax, "speed", "m/s")
     _draw_legend(ax, 3)

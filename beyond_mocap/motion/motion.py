@@ -16,6 +16,10 @@ from ..base.vectors import dot_products
 from . import quaternion
 from .skeleton import Skeleton, freeze_array
 
+RATE_TOLERANCE = 0.15
+"""Share by which a motion may be played faster or slower than recorded and still look as recorded."""
+ACCEPTED_RATES = (1.0 - RATE_TOLERANCE, 1.0 + RATE_TOLERANCE)
+"""Lowest and highest playback rate (played over recorded speed) that looks as recorded."""
 _PLUS, _MINUS = np.add, np.subtract
 _FEW_FRAMES, _SOME_JOINTS = 100, 8
 """Frames up to which, and joints from which on a pose is computed by depth: there the calls take longer than what they

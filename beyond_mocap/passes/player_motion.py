@@ -24,7 +24,7 @@ from ..library.automatic_locomotion import build_automatic_labels
 from ..library.keys import Key
 from ..library.library import Library
 from ..motion import quaternion
-from ..motion.motion import Motion
+from ..motion.motion import ACCEPTED_RATES, Motion
 from ..motion.track import BALL_RADIUS, SampledTrack, Track
 from ..motion.track.ball_path import BallPath
 from ..motion.track.sampling import compute_travel_direction
@@ -48,8 +48,6 @@ TRANSITION = 0.4
 """Seconds over which one piece of a clip blends into the next."""
 READY = "ready"
 """Label of waiting for the ball, which players who stand show where the library has it."""
-FASTEST_FACTOR = 1.15
-"""Times the library's highest speed that a player reaches without a warning."""
 _PART_LABELS = {**{part: part for part in BODY_PARTS}, "hand": "throw"}  # there is no label "hand"
 _WATCH_WEIGHT = 0.02  # weight of facing the ball while standing, against the clip's own turning
 
@@ -313,7 +311,7 @@ class _PlayerBuilder:
     def _list_warnings(self, met: FixedStrikeResult, track: SampledTrack) -> tuple[str, ...]:
         """Describe where the player would be too fast and where the part does not reach the ball."""
         warnings, fastest = [], int(np.argmax(track.speed))
-        if track.speed[fastest] > FASTEST_FACTOR * self.library.max_speed:
+        if track.speed[fastest] > ACCEPTED_RATES[1] * self.library.max_speed:
             needed_speed, library_speed = track.speed[fastest], self.library.max_speed
             warnings.append(
                 f"{self.times[fastest]:.2f} s: the player has to run {needed_speed:.1f} m/s to arrive in time, but "

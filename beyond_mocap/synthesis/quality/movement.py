@@ -19,6 +19,7 @@ from ...base.time_series import find_runs, interpolate_columns, time_derivative
 from ...base.vectors import unit_vectors
 from ...motion import quaternion
 from ...motion.humanoid import identify_joints
+from ...motion.motion import ACCEPTED_RATES
 from ...motion.skeleton import Skeleton
 from ...motion.track import Track, smooth_zero_phase_hann
 
@@ -128,21 +129,20 @@ def fill_from_nearest(values: np.ndarray) -> np.ndarray:
     return np.array([values[known[np.argmin(np.abs(known - k))]] for k in range(len(values))])
 
 
-def measure_speed_coverage(requested: np.ndarray, fastest: float, slowest: float, reach=(0.85, 1.15)) -> dict[str,
-        float]:
-    """Measure the shares of frames with a speed that the library cannot play within the warp limits.
+def measure_speed_coverage(requested: np.ndarray, fastest: float, slowest: float) -> dict[str, float]:
+    """Measure the shares of frames with a speed that the library cannot play within `ACCEPTED_RATES`.
 
     Args:
         requested: (T,) m/s of the track.
         fastest: m/s, fastest root of the library.
         slowest: m/s, slowest gait of the library.
-        reach: warp limits.
     Returns:
-        above: share with wanted > fastest x 1.15; below: share with wanted < slowest x 0.85 and more than standing
-        (0.5 m/s). NaN where the library's speed is not known.
+        above: share that is faster than the fastest one can be played; below: share that is slower than the slowest
+        one, and faster than standing (0.5 m/s). NaN where the library's speed is not known.
     """
-    above = np.mean(requested > fastest * reach[1]) if np.isfinite(fastest) else np.nan
-    below = np.mean((requested < slowest * reach[0]) & (requested > STANDING_SPEED)) if np.isfinite(slowest) else np.nan
+    above = np.mean(requested > fastest * ACCEPTED_RATES[1]) if np.isfinite(fastest) else np.nan
+    too_slow = (requested < slowest * ACCEPTED_RATES[0]) & (requested > STANDING_SPEED)
+    below = np.mean(too_slow) if np.isfinite(slowest) else np.nan
     return {"above": float(above), "below": float(below)}
 
 

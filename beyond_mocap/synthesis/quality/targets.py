@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from ...motion.motion import ACCEPTED_RATES
+
 _SLACK = 1e-9  # of a comparison, for rounding
 
 
@@ -117,8 +119,8 @@ TARGETS = {
     "seam_jerk_ratio.share_above_real": Target(most=0.10),
     "seam_jerk_ratio.max": Target(most=1.3),
     "seam_jerk_ratio.rest_max": Target(most=1.3),
-    "warp_rate.min": Target(least=0.85),
-    "warp_rate.max": Target(most=1.15),
+    "warp_rate.min": Target(least=ACCEPTED_RATES[0]),
+    "warp_rate.max": Target(most=ACCEPTED_RATES[1]),
     "loop_share": Target(most=0.05),
     "pose_realism": Target(most=0.10),
     "annotation_similarity.all": Target(most=-0.9),

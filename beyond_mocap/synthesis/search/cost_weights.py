@@ -66,7 +66,7 @@ class Weights:
         synthetic: for a synthetic clip; it is used only where recordings miss the speed by more.
         synthetic_key: the same at key moments, where a recording is worth more.
         rate: per unit of time warp.
-        stretch: per unit of time warp beyond 0.85 to 1.15.
+        stretch: per unit of time warp beyond `ACCEPTED_RATES`.
         strike: for a key moment's clip that does not fit its ball (`key_fit`).
         switch: for any cut.
         other: for a cut to another recording.

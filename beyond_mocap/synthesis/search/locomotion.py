@@ -9,8 +9,8 @@ Decisions where the paper is vague or misprinted:
 - The steps that build S' run the same recursion for every end block; here it runs once for all, and the candidates are
   read off every layer. Of the sequences within DISTANCE_TOLERANCE of the requested distance the one with the lowest
   cost per block wins (the paper's arg min of the distance alone takes bad transitions to win a millimetre); if none is,
-  the nearest one. Among those within it, sequences that are played between PLAYED_AT_SPEED times as fast as recorded
-  go before all others: a slow walk of many blocks, played half as fast again, would often be cheaper by a little.
+  the nearest one. Among those within it, sequences that are played at ACCEPTED_RATES go before all
+  others: a slow walk of many blocks, played half as fast again, would often be cheaper by a little.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ import numpy as np
 from ...annotation import LOCOMOTION_LABELS
 from ...base.vectors import distances_along
 from ...library.library import Library
+from ...motion.motion import ACCEPTED_RATES
 from ...motion.track import SampledTrack
 from .block_choice import STRETCH, choose_stretches, count_demands
 from .block_costs import collect_windows, compute_distances
@@ -29,9 +30,6 @@ from .blocks import FINEST_LENGTH, BlockCandidates, BlockSearch
 from .request import SearchRequest
 
 DISTANCE_TOLERANCE = 0.1  # m from the requested distance within which a sequence fits
-
-PLAYED_AT_SPEED = (0.85, 1.15)
-"""Rates of playback that eyes accept (the time-warp rates that takes aim at)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,7 +229,7 @@ def _read_chain(layers, back, slots: int) -> np.ndarray:
     cost = np.stack([c for _, c in layers])
     close = error <= DISTANCE_TOLERANCE
     rate = (np.arange(len(layers))[:, None] + 3) / slots
-    at_speed = close & (rate >= PLAYED_AT_SPEED[0]) & (rate <= PLAYED_AT_SPEED[1])
+    at_speed = close & (rate >= ACCEPTED_RATES[0]) & (rate <= ACCEPTED_RATES[1])
     fits = at_speed if at_speed.any() else close
     score = np.where(fits, cost, np.inf) if fits.any() else error
     layer, block = np.unravel_index(int(np.argmin(score)), score.shape)

@@ -15,6 +15,7 @@ from ...annotation import LOCOMOTION
 from ...annotation.gaits import TURNING, compute_heading_offset
 from ...annotation.vocabulary import DIRECTIONS
 from ...library.library import Library
+from ...motion.motion import RATE_TOLERANCE
 from ..known_body import KnownFeatures
 from .candidate_index import ACTING, PLAYBACK_RATES, SLOT, CandidateIndex, RatePairs
 from .cost_weights import Term, Weights
@@ -294,7 +295,7 @@ class PathCosts:
         # library frames that lie beyond either end of the clip
         held = np.maximum(low - start, 0) + np.maximum(start + rate * length - high, 0)
         off = np.abs(rate - 1.0)
-        far = self.weights.stretch * np.maximum(off - 0.15, 0.0)
+        far = self.weights.stretch * np.maximum(off - RATE_TOLERANCE, 0.0)
         yield "rate", self.weights.rate * off + far + self.weights.held * held
         yield "made", self.weights.synthetic_key * self.index.is_synthetic[self.index.round_frame(start)]
         if self.request.style_cost is not None:

@@ -16,7 +16,7 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.vectors import arctan2
 from ...motion import quaternion
-from ...motion.motion import compute_pose, sample_frames_cubic
+from ...motion.motion import ACCEPTED_RATES, compute_pose, sample_frames_cubic
 from .chains import find_chains
 from .description import Description
 from .example import Example
@@ -25,8 +25,6 @@ from .phases import AT_RELEASE, compute_motion_phase
 
 MAX_BLENDED = 4
 """Maximum number of examples that are blended."""
-PACE_RANGE = (0.85, 1.15)
-"""Range of the playback rate of a blend."""
 _STEEP, _FAST, _FAR, _HIGH = np.radians(3.0), 1.5, 0.35, 0.6  # rad, m/s, log ratio and m of equal dissimilarity
 _SHARPNESS = 2.0  # exponent by which the weights decrease with dissimilarity
 _TIME_SHARE = 0.25  # share of plain time in the phase, so that it also increases where the limb does not move
@@ -87,7 +85,7 @@ def plan_motion(examples: Sequence[Example], launches: np.ndarray, request: Laun
     chosen, weights = choose_examples(examples, launches, request, seed)
     taken = [examples[index] for index in chosen]
     speed = float(weights @ np.linalg.norm(launches[chosen], axis=1))
-    pace = float(np.clip(request.speed / max(speed, 1e-9), *PACE_RANGE))
+    pace = float(np.clip(request.speed / max(speed, 1e-9), *ACCEPTED_RATES))
     return _blend_examples(taken, weights, pace, request)
 
 
