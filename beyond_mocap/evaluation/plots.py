@@ -155,20 +155,20 @@ def draw_strip(view: View, frames: Sequence[int], marked: int | None = None) -> 
     return render_png(canvas)
 
 
-def create_canvas(height: float, rows: int = 1, columns: int = 1, **layout):
+def create_canvas(height: float, rows: int = 1, **layout):
     """Create a figure without a window.
 
     Args:
         height: inches.
-        rows, columns: number of axes.
+        rows: number of axes, one below the other.
         layout: arguments of `Figure.subplots`.
     Returns:
-        The figure, and its axes row by row.
+        The figure, and its axes from the top down.
     """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(WIDTH, height), dpi=DPI, layout="constrained")
-    axes = figure.subplots(rows, columns, squeeze=False, **layout).ravel()
+    axes = figure.subplots(rows, squeeze=False, **layout).ravel()
     style_axes(axes)
     return figure, axes
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ..base.time_series import time_derivative
-from ..library.features import compute_raw_features, select_feature_joints
+from ..library.features import HORIZON, compute_raw_features, select_feature_joints
 from ..motion import quaternion
 from ..motion.humanoid import Humanoid, compute_heading_from_positions, identify_joints
 from ..motion.motion import Motion
@@ -19,7 +19,6 @@ from ..motion.skeleton import Skeleton
 from ..synthesis.quality import movement
 from ..synthesis.quality.movement import classify_speed
 
-VELOCITY_SECONDS = 0.12  # weight of m/s against metres, like `library.features.HORIZON`
 FEWEST_RECORDINGS = 3
 """Recordings that a speed class needs, so that with one's own left out two others show how far apart people are."""
 _ROWS_AT_ONCE = 512  # rows of distances at once, to limit memory
@@ -81,7 +80,7 @@ def build_pose_features(skeleton: Skeleton, positions: np.ndarray, fps: float, h
     """
     local = compute_local_positions(skeleton, positions, hips)
     velocities = rotate_about_up(time_derivative(positions, fps),
-                                 -compute_heading_from_positions(skeleton, positions)) * VELOCITY_SECONDS
+                                 -compute_heading_from_positions(skeleton, positions)) * HORIZON
     both = np.concatenate([local, velocities], axis=1).reshape(len(positions), -1)
     return both / np.float32(np.sqrt(len(skeleton)))
 

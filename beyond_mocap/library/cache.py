@@ -332,14 +332,13 @@ def _build_header(key: str, library) -> dict:
     }  # fmt: skip
 
 
-def has_library(place: Path, name: str = "library") -> bool:
+def has_library(place: Path) -> bool:
     """Return whether a folder holds a cached library, of whatever content.
 
     Args:
         place: the cache's folder.
-        name: of the file, without its ending.
     """
-    return (place / f"{name}.json").is_file()
+    return (place / "library.json").is_file()
 
 
 def load_library(place: Path, key: str, name: str = "library") -> dict | None:

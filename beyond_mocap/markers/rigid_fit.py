@@ -105,7 +105,7 @@ def to_model_frame(fit: RigidFit, seen: np.ndarray) -> np.ndarray:
     return np.einsum("...ji,...nj->...ni", fit.rotation, seen - fit.shift[..., None, :])
 
 
-def compute_mean_rotation(rotations: np.ndarray, weights: np.ndarray | None = None) -> np.ndarray:
+def compute_mean_rotation(rotations: np.ndarray) -> np.ndarray:
     """Compute the mean of rotation matrices: the rotation nearest to all by squared chords.
 
     The result equals the dominant eigenvector of the quaternions' outer products, computed from the sum of the
@@ -113,13 +113,12 @@ def compute_mean_rotation(rotations: np.ndarray, weights: np.ndarray | None = No
 
     Args:
         rotations: (T, 3, 3) rotation matrices; NaN ones are left out.
-        weights: (T,) weights, or None.
     Returns:
         (3, 3) the mean rotation; the identity if there is no rotation.
     Source: Markley et al. 2007, reference [46] of Fredriksson section 5.2.1.
     """
     rotations = np.asarray(rotations, dtype=float)
-    weight = np.isfinite(rotations).all(axis=(-1, -2)) * (1.0 if weights is None else np.asarray(weights, dtype=float))
+    weight = np.isfinite(rotations).all(axis=(-1, -2)) * 1.0
     if not np.any(weight > 0.0):
         return np.eye(3)
     total = np.einsum("t,tij->ij", weight, np.where(weight[:, None, None] > 0.0, rotations, 0.0))

@@ -291,7 +291,7 @@ def _densify_samples(places: np.ndarray, times: np.ndarray, degree: int) -> tupl
     return CubicSpline(times, places)(fine), fine
 
 
-def fit_spline(places: np.ndarray, times: np.ndarray, seconds: float = SWAY_SECONDS) -> SplinePath:
+def fit_spline(places: np.ndarray, times: np.ndarray) -> SplinePath:
     """Fit a smoothing spline: least squares with a cost on the change of acceleration.
 
     The remainder is smoothed again and added, which makes the limit between path and sway sharper (Tukey's twicing).
@@ -306,7 +306,6 @@ def fit_spline(places: np.ndarray, times: np.ndarray, seconds: float = SWAY_SECO
     Args:
         places: (T, 3) metres.
         times: (T,) seconds, rising.
-        seconds: sets the limit between path and sway.
     Returns:
         The spline path.
     Raises:
@@ -315,9 +314,9 @@ def fit_spline(places: np.ndarray, times: np.ndarray, seconds: float = SWAY_SECO
     places, times = _check_samples(places, times)
     after, left = times - times[0], times[-1] - times
     weights = 1.0 + _ENDS * (np.exp(-after / _ENDS_SECONDS) + np.exp(-left / _ENDS_SECONDS))
-    pieces, rest, coefficients = count_spline_pieces(times[-1] - times[0], seconds), places, 0.0
+    pieces, rest, coefficients = count_spline_pieces(times[-1] - times[0], SWAY_SECONDS), places, 0.0
     for _ in range(_PASSES):
-        knots, more = fit_smoothing_spline(rest, times, pieces, stiff=seconds, order=min(_ORDER, len(places)),
+        knots, more = fit_smoothing_spline(rest, times, pieces, stiff=SWAY_SECONDS, order=min(_ORDER, len(places)),
                                            weights=weights)
         coefficients = coefficients + more
         path = SplinePath(knots, coefficients)

@@ -74,10 +74,10 @@ def pose_body(
     top.location = quaternion.rotate(quaternion.inverse(rest[0]), shift)  # assigning also makes Blender update
 
 
-def keep_recording(context: bpy.types.Context, motion: motions.Motion, name: str = "Recorded") -> bpy.types.Object:
+def keep_recording(context: bpy.types.Context, motion: motions.Motion) -> bpy.types.Object:
     """Create a character that plays `motion` from the current frame on."""
     if motion.duration * frames_per_second(context.scene) < 1.0:
         raise InputError("stream", "less than a frame", "a second or more", "let the stream run for a while")
-    thing = create_body(context, motion, name)
+    thing = create_body(context, motion, "Recorded")
     action.write_motion(thing, motion, context.scene, float(context.scene.frame_current), f"{thing.name} motion")
     return thing

@@ -54,9 +54,9 @@ class Canvas:
                      (left, bottom, left + width, top), (right - width, bottom, right, top)):
             self.add_box(edge, colour)
 
-    def add_diamond(self, x: float, y: float, half: float, colour, alpha: float = 1.0) -> None:
+    def add_diamond(self, x: float, y: float, half: float, colour) -> None:
         """Add a diamond."""
-        self._add_square(((x - half, y), (x, y - half), (x + half, y), (x, y + half)), (*colour, alpha))
+        self._add_square(((x - half, y), (x, y - half), (x + half, y), (x, y + half)), (*colour, 1.0))
 
     def add_text(self, place: tuple[float, float], text: str, size: float, colour, alpha: float = 1.0) -> None:
         """Add a text that begins at a place on its baseline; it is drawn over all shapes."""

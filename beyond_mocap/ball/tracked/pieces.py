@@ -198,7 +198,7 @@ def measure_velocity_change(points: np.ndarray, side: int, interval: float) -> n
     return change
 
 
-def choose_cuts(times, points, weights, places, cut_cost: float = CUT_COST) -> np.ndarray:
+def choose_cuts(times, points, weights, places) -> np.ndarray:
     """Choose the cuts between pieces that explain the samples best.
 
     Args:
@@ -206,12 +206,11 @@ def choose_cuts(times, points, weights, places, cut_cost: float = CUT_COST) -> n
         points: (N, D) m.
         weights: (N,) 1/m^2.
         places: candidate cuts, ascending; the first and last always stay.
-        cut_cost: nats per cut.
     Returns:
         The chosen places.
     """
     pieces = fit_between(times, points, weights, places, _LONGEST)
-    return places[find_lowest_cost_cuts(pieces, places, cut_cost)]
+    return places[find_lowest_cost_cuts(pieces, places, CUT_COST)]
 
 
 def find_lowest_cost_cuts(pieces: PieceFits, places: np.ndarray, cut_cost: float) -> np.ndarray:

@@ -14,7 +14,7 @@ from ...base.errors import InputError, UserCancelledError
 from ...motion.humanoid import identify_joints
 from ...motion.motion import Motion
 from ..folder.label_sources import Proposal, is_unreviewed
-from ..proposals import GAITS, propose_labels
+from ..proposals import propose_labels
 from .signals import Signals, build_signals
 
 _MODIFIERS = frozenset((*LOCOMOTION, *VOCABULARY["modifier"], *list_labels(group="height")))
@@ -37,9 +37,9 @@ class Example:
     rule_proposals: tuple[Proposal, ...]
 
     @classmethod
-    def from_clip(cls, name: str, motion: Motion, rows: Sequence[ClipAnnotation], gaits=GAITS) -> "Example":
+    def from_clip(cls, name: str, motion: Motion, rows: Sequence[ClipAnnotation]) -> "Example":
         """Build an example from a motion and its rows; InputError where the skeleton has no legs."""
-        return cls(name, build_signals(motion), tuple(rows), propose_labels(motion, gaits))
+        return cls(name, build_signals(motion), tuple(rows), propose_labels(motion))
 
     def select_rows(self, act: str, moment: bool) -> list[ClipAnnotation]:
         """Select the rows of one act that have a key moment, or that have none."""

@@ -152,15 +152,13 @@ def measure_carried_marker(positions: np.ndarray, marker: int, carriers: Sequenc
                          sigma=sigma)
 
 
-def choose_carriers(marker: int, softness: np.ndarray, positions: np.ndarray,
-                    max_count: int = _MAX_CARRIERS) -> tuple[int, ...]:
+def choose_carriers(marker: int, softness: np.ndarray, positions: np.ndarray) -> tuple[int, ...]:
     """Choose markers that keep their distances from a marker and from each other, and are not on one line.
 
     Args:
         marker: index of the marker.
         softness: (M, M) metres.
         positions: (T, M, 3) metres.
-        max_count: maximum number.
     Returns:
         Indices of the carriers; () where fewer than three qualify.
     """
@@ -168,7 +166,7 @@ def choose_carriers(marker: int, softness: np.ndarray, positions: np.ndarray,
     for tolerance in _TOLERANCES:
         chosen: list[int] = []
         for other in order:
-            if softness[marker, other] > 2.0 * tolerance or len(chosen) == max_count:
+            if softness[marker, other] > 2.0 * tolerance or len(chosen) == _MAX_CARRIERS:
                 break
             if len(chosen) >= 3 and softness[marker, other] > 2.0 * softness[marker, chosen[2]] + 0.002:
                 break  # a much softer one would rotate the frame more than it stabilises it

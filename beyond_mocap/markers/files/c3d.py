@@ -69,12 +69,11 @@ class _Parameters:
     def __init__(self, reader, order: str, dec: bool):
         self._reader, self.header, self.order, self.dec = reader, reader.header, order, dec
 
-    def read_numbers(self, name: str, unsigned: bool = True) -> np.ndarray:
-        """Return the values of a numeric parameter.
+    def read_numbers(self, name: str) -> np.ndarray:
+        """Return the values of a numeric parameter; 16-bit integers are counts up to 65535.
 
         Args:
             name: GROUP:NAME.
-            unsigned: read 16-bit integers as counts up to 65535; False reads them as signed.
         Returns:
             (N,) float; empty where the parameter is absent or text.
         """
@@ -82,7 +81,7 @@ class _Parameters:
         if parameter is None:
             return np.zeros(0)
         size = parameter.bytes_per_element
-        kinds = {1: "u1", 2: f"{self.order}{'u' if unsigned else 'i'}2", 4: f"{self.order}f4"}
+        kinds = {1: "u1", 2: f"{self.order}u2", 4: f"{self.order}f4"}
         if size not in kinds:
             return np.zeros(0)
         data = parameter.bytes[: len(parameter.bytes) // size * size]

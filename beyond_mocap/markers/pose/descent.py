@@ -25,7 +25,7 @@ from .chain import (
     to_rotation_vectors,
 )
 
-MAX_STEPS = 24  # steps at most
+_MAX_STEPS = 24  # steps at most
 _CURVED_GAIN = 0.1  # a step that gains a smaller share of the cost is near enough for second derivatives to help
 _CONVERGED_STEP = 1e-5  # radians (and metres): a frame with a smaller step has converged
 _NO_GAIN = 1e-7  # as has one whose cost falls by a smaller share
@@ -147,13 +147,12 @@ class State:
         return *placed, self.away, self.bend, self.uneven, self.from_target, self.cost
 
 
-def descend(task: PoseTask, start: Poses, max_steps: int = MAX_STEPS) -> DescentResult:
+def descend(task: PoseTask, start: Poses) -> DescentResult:
     """Find the poses nearest to the recorded markers, downhill from the initial poses.
 
     Args:
         task: what to fit, F frames.
         start: F initial poses.
-        max_steps: steps at most.
     Returns:
         Poses, costs, steps and held joints.
     """
@@ -164,7 +163,7 @@ def descend(task: PoseTask, start: Poses, max_steps: int = MAX_STEPS) -> Descent
     out = DescentResult(best.poses.copy_arrays(), best.cost.copy(), np.zeros(total, dtype=int), none)
     active, done = np.arange(total), np.zeros(total, dtype=bool)
     damping, curved = np.full(total, _INITIAL_DAMPING), np.zeros(total, dtype=bool)
-    for _ in range(max_steps):
+    for _ in range(_MAX_STEPS):
         size, held, trial = _take_step(task, best, limited_joints, damping, curved)
         better = trial.cost <= best.cost * (1.0 + 1e-12) + 1e-18
         gain = best.cost - trial.cost

@@ -27,14 +27,13 @@ PICTURE_SIZE = 224
 """Pixels, side of a player's picture."""
 
 
-def render_heat_strip(bad: np.ndarray, start: float, span: tuple[float, float], height: int = 1) -> bytes:
-    """Render the strip of one player.
+def render_heat_strip(bad: np.ndarray, start: float, span: tuple[float, float]) -> bytes:
+    """Render the strip of one player, a pixel high.
 
     Args:
         bad: (S,) multiples of the limit, one per second, NaN where the player has no motion.
         start: s of the first value.
         span: first and last second of the strip.
-        height: pixels.
     Returns:
         PNG.
     """
@@ -45,7 +44,7 @@ def render_heat_strip(bad: np.ndarray, start: float, span: tuple[float, float], 
     whole[rows[inside]] = bad[inside]
     cells = min(count, MAX_CELLS)
     edges = np.linspace(0, count, cells + 1).astype(int)[:-1]
-    return encode_png(np.repeat(compute_colours(np.fmax.reduceat(whole, edges))[None], height, axis=0))
+    return encode_png(compute_colours(np.fmax.reduceat(whole, edges))[None])
 
 
 def build_thumbnail_renderer(

@@ -22,6 +22,7 @@ _USUAL_SPEEDS = (0.2, 7.0)  # m/s; the median of a player's speed lies between t
 _JITTER = 0.06  # metres; noise of single samples from which on a track is smoothed: optical systems have 0.01
 _JITTER_LEFT, _JITTER_SECONDS = 0.04, (0.4, 1.5)  # metres of noise that smoothing should leave; seconds of its window
 _SLOPE_SECONDS = 0.3  # seconds whose slope is the velocity next to a gap
+_MOST_NAMED = 5  # times or stretches that a line names
 _MAX_GAP = 3600.0  # seconds
 
 
@@ -305,10 +306,9 @@ def _describe_replacements(track: Track) -> list[str]:
     return out
 
 
-def _describe_times(times, most: int = 5) -> str:
+def _describe_times(times) -> str:
     """Describe the first few of some times."""
-    named = ", ".join(f"{time:.2f}" for time in list(times)[:most])
-    return f"{named} s" + (f" and {len(times) - most} more" if len(times) > most else "")
+    return _describe_first([f"{time:.2f}" for time in times])
 
 
 def _describe_stretches(times: np.ndarray, interval: float) -> str:
@@ -316,4 +316,10 @@ def _describe_stretches(times: np.ndarray, interval: float) -> str:
     starts = np.flatnonzero(np.diff(times, prepend=-np.inf) > 1.5 * interval)
     ends = [*(starts[1:] - 1), len(times) - 1]
     named = [f"{times[a]:.2f}" if a == b else f"{times[a]:.2f}-{times[b]:.2f}" for a, b in zip(starts, ends)]
-    return ", ".join(named[:5]) + " s" + (f" and {len(named) - 5} more" if len(named) > 5 else "")
+    return _describe_first(named)
+
+
+def _describe_first(named: list[str]) -> str:
+    """Join the first of some times in seconds, and count the others."""
+    more = f" and {len(named) - _MOST_NAMED} more" if len(named) > _MOST_NAMED else ""
+    return f"{', '.join(named[:_MOST_NAMED])} s{more}"

@@ -102,21 +102,19 @@ def _extend_rests(positions: np.ndarray, rests: list[tuple[int, int]]) -> Iterat
         yield begin, free_from, middle
 
 
-def find_rests(positions: np.ndarray, fps: float, half_diagonal: float = REST_HALF_DIAGONAL,
-               seconds: float = MIN_REST_SECONDS) -> list[tuple[int, int]]:
+def find_rests(positions: np.ndarray, fps: float, seconds: float = MIN_REST_SECONDS) -> list[tuple[int, int]]:
     """Find the stretches in which positions stay within a small box: the longest first, without overlap.
 
     Args:
         positions: (T, 2) m.
         fps: frames per second.
-        half_diagonal: m from the box's middle to its corner.
         seconds: of the shortest stretch.
     Returns:
         (first, end) frames, in order of time.
     """
     found: list[tuple[int, int]] = []
     least = max(int(round(seconds * fps)), 2)
-    length = measure_rest_lengths(positions, half_diagonal, least)
+    length = measure_rest_lengths(positions, REST_HALF_DIAGONAL, least)
     queue: list[tuple[int, int, int, int]] = []
     _push_longest(queue, length, 0, len(positions))
     while queue and -queue[0][0] >= least:

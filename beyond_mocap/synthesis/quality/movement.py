@@ -27,6 +27,7 @@ ROOT_WINDOW = 1.5  # s, of the root error
 TRAVEL_WINDOW = 1.0  # s, of the travel speed
 STANDING_SPEED = 0.5  # m/s below which a body counts as standing
 SPEED_EDGES = (1.0, 2.0, 3.0, 4.5)  # m/s between the classes of `classify_speed`
+MIN_CLASS_VALUES = 30  # values that a class needs, so that its figure is known
 # jerk indices to either side of a transition, and from its middle index to its frame
 JERK_REACH, TRANSITION_TO_JERK = 8, 2
 _WIDTH = 2 * JERK_REACH + 1
@@ -107,17 +108,17 @@ def measure_surge(pelvis: np.ndarray, fps: float) -> np.ndarray:
     return (along - smooth_zero_phase_hann(along, fps, ROOT_WINDOW))[:, 0]
 
 
-def compute_class_rms(values: np.ndarray, classes: np.ndarray, least: int = 30) -> np.ndarray:
+def compute_class_rms(values: np.ndarray, classes: np.ndarray) -> np.ndarray:
     """Compute the root mean square in each speed class.
 
     Args:
         values: (N,).
         classes: (N,) class of each.
-        least: values that a class needs.
     Returns:
-        (5,), NaN where a class has too few.
+        (5,), NaN where a class has fewer than MIN_CLASS_VALUES.
     """
-    rms = [np.sqrt(np.mean(values[classes == k] ** 2)) if np.sum(classes == k) >= least else np.nan for k in range(5)]
+    rms = [np.sqrt(np.mean(values[classes == k] ** 2)) if np.sum(classes == k) >= MIN_CLASS_VALUES else np.nan
+           for k in range(5)]
     return np.array(rms)
 
 
@@ -183,26 +184,25 @@ def collect_uncut_windows(values: np.ndarray, speed: np.ndarray) -> tuple[np.nda
     return compute_window_maxima(values)[whole], speed[TRANSITION_TO_JERK:][whole]
 
 
-def compute_real_p95(windows: np.ndarray, speed: np.ndarray, least: int = 30) -> np.ndarray:
+def compute_real_p95(windows: np.ndarray, speed: np.ndarray) -> np.ndarray:
     """Compute the 95th percentile of uncut windows in each speed class.
 
-    A class with fewer than `least` windows takes the nearest class that has them (runs above 4.5 m/s are rare).
+    A class with fewer than MIN_CLASS_VALUES windows takes the nearest class that has them (runs above 4.5 m/s are rare).
 
     Args:
         windows: (M,) m/s^3.
         speed: (M,) m/s.
-        least: windows that a class needs.
     Returns:
         (5,) m/s^3, NaN where no class has enough.
     """
     classes = classify_speed(speed)
     values = [windows[classes == k] for k in range(5)]
-    return fill_from_nearest(np.array([np.percentile(v, 95) if len(v) >= least else np.nan for v in values]))
+    return fill_from_nearest(np.array([np.percentile(v, 95) if len(v) >= MIN_CLASS_VALUES else np.nan for v in values]))
 
 
-def find_recorded_classes(speed: np.ndarray, least: int = 30) -> np.ndarray:
-    """Find the speed classes (5,) bool with `least` windows or more, of speeds (M,) m/s (see `compute_real_p95`)."""
-    return np.bincount(classify_speed(speed), minlength=5) >= least
+def find_recorded_classes(speed: np.ndarray) -> np.ndarray:
+    """Find the speed classes (5,) bool with MIN_CLASS_VALUES or more of the speeds (M,) m/s."""
+    return np.bincount(classify_speed(speed), minlength=5) >= MIN_CLASS_VALUES
 
 
 def compute_transition_ratios(values: np.ndarray, transitions: np.ndarray, speed: np.ndarray,

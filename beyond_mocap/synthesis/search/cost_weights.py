@@ -5,7 +5,7 @@ Costs are per slot, about 1 per metre per second of missed speed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -107,7 +107,7 @@ class Weights:
     held: float = 0.1
 
 
-def balance_weights(alpha: float, weights: Weights = Weights()) -> Weights:
+def balance_weights(alpha: float) -> Weights:
     """Balance labels against continuity by alpha.
 
     Labels are scaled by alpha / 0.2, continuity (cut, change of pose and of playback rate) by (1 - alpha) / 0.8, so
@@ -116,4 +116,4 @@ def balance_weights(alpha: float, weights: Weights = Weights()) -> Weights:
     """
     words, continuity = alpha / Plan.alpha, (1.0 - alpha) / (1.0 - Plan.alpha)
     factors = {"words": words, "automatic_words": words, **dict.fromkeys(_CONTINUITY, continuity)}
-    return replace(weights, **{name: getattr(weights, name) * factor for name, factor in factors.items()})
+    return Weights(**{name: getattr(Weights, name) * factor for name, factor in factors.items()})
