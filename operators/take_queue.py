@@ -243,10 +243,10 @@ class TakeOperator(BaseOperator):
             ok = self.attempt(lambda: store_result(bpy.context, player, entry.request, job.result)) == {"FINISHED"}
             if ok and queue.list_players():  # the last one's undo step is the operator's own
                 bpy.ops.ed.undo_push(message=f"{self.bl_label} {player.name}")
-        self.stored_count += ok
-        self.last = ok
+        self.stored_count, self.last = self.stored_count + ok, ok
         if ok:
-            self.add_message(f"{player.name}: {what}{_describe_takes([player])}; press Apply or Revert", _rate([player]))
+            text = f"{player.name}: {what}{_describe_takes([player])}; press Apply or Revert"
+            self.add_message(text, _rate([player]))
         return True
 
     current = ""  # the player whose request is built or processed
