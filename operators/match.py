@@ -51,7 +51,7 @@ class MatchVerb(BackgroundOperator):
         took = show.show_match(bpy.context, scenery, first)
         match.shown, match.shown_start, match.shown_first = wanted.folder, scenery.start, first
         match.shown_rate = frames_per_second(scene)
-        known = match.report.splitlines()
+        known, match.quality = match.report.splitlines(), scenery.quality
         match.messages = "\n".join(line for line in dict.fromkeys((*lines, *notes)) if line not in known)
         for line in lines:
             self.report({"WARNING"}, line)

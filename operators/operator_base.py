@@ -27,7 +27,7 @@ class BaseOperator:
         needs: pairs of a message for the user while the operator is disabled, and a function of the context that
             returns whether it is enabled; they are checked in order.
         presents: whether the 3D view moves to the objects that it adds, and the stage's cameras follow them.
-        pops_up: whether a pop-up shows a failure, beside the panel.
+        pops_up: whether a pop-up shows a failure that no panel shows.
         resumes: number of the notice that it fixes, 0 for none.
     """
 

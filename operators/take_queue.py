@@ -111,14 +111,15 @@ class TakeOperator(BaseOperator):
         except BeyondMocapError:
             show_library(context.scene, entries[0].request)
             raise
-        for entry, result in zip(entries, results):
-            store_result(context, context.scene.beyond_mocap.players[entry.player], entry.request, result)
-        self.clear_failures(context.scene, *(entry.player for entry in entries))
         players = [context.scene.beyond_mocap.players[entry.player] for entry in entries]
+        what = "Nothing has changed" if all(map(_is_unchanged, players, entries, results)) else "Generated"
+        for player, entry, result in zip(players, entries, results):
+            store_result(context, player, entry.request, result)
+        self.clear_failures(context.scene, *(entry.player for entry in entries))
         if difference := ball_tracks.describe_difference(context.scene):
             self.report({"WARNING"}, str(difference))
         names = ", ".join(player.name for player in players)
-        self.report({_rate(players)}, f"Generated: {names}{_describe_takes(players)}; press Apply or Revert")
+        self.report({_rate(players)}, f"{what}: {names}{_describe_takes(players)}; press Apply or Revert")
 
     def process_entries(self, window, entries) -> "list[orders.RequestResult]":
         """Generate the takes of all entries, with the progress at the pointer."""
@@ -237,14 +238,14 @@ class TakeOperator(BaseOperator):
             return True
         if job.is_ending:
             queue.clear_queue()
+        what = "nothing has changed" if _is_unchanged(player, entry, job.result) else "generated"
         with context.temp_override(window=window):
             ok = self.attempt(lambda: store_result(bpy.context, player, entry.request, job.result)) == {"FINISHED"}
             if ok and queue.list_players():  # the last one's undo step is the operator's own
                 bpy.ops.ed.undo_push(message=f"{self.bl_label} {player.name}")
-        self.stored_count += ok
-        self.last = ok
+        self.stored_count, self.last = self.stored_count + ok, ok
         if ok:
-            text = f"{player.name}: generated{_describe_takes([player])}; press Apply or Revert"
+            text = f"{player.name}: {what}{_describe_takes([player])}; press Apply or Revert"
             self.add_message(text, _rate([player]))
         return True
 
@@ -332,6 +333,11 @@ class TakeOperator(BaseOperator):
         running.kind = running.waiting = ""
         stop_timer(context, self.clock)
         _redraw_sidebars(context)
+
+
+def _is_unchanged(player, entry: "queue.QueueEntry", result) -> bool:
+    """Return whether an update had the inputs of the take that the player has."""
+    return entry.mode.kind == "update" and json.loads(player.result.made_of or "{}") == result.made_of
 
 
 def _name_topic(player: str) -> str:

@@ -109,7 +109,9 @@ def draw_processing(layout, scene) -> None:
 
 
 def draw_display(layout, match) -> None:
-    """Draw the cameras, and messages about the displayed match."""
+    """Draw the quality, the cameras, and messages about the displayed match."""
+    if match.quality:
+        draw_paragraph(layout, f"Quality: {match.quality}", "INFO")
     row = layout.row(align=True)
     row.operator("beyond_mocap.match_camera", text="Broadcast", icon="VIEW_CAMERA").which = "STAND"
     row.operator("beyond_mocap.match_camera", text="Eyes", icon="HIDE_OFF").which = "EYES"

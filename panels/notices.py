@@ -1,4 +1,4 @@
-"""Notices: what went wrong, with its fixes as buttons, in a pop-up and in the panel that it belongs to."""
+"""Notices: what went wrong, with its fixes as buttons, in the panel that it belongs to, else in a pop-up."""
 
 from __future__ import annotations
 
@@ -17,14 +17,23 @@ TASKS = {  # feature -> the task below whose switch its notices are shown; a ste
 POPUP_WIDTH, POPUP_LETTERS = 21, 70  # the pop-up's width in units of the interface, and letters in a line of it
 
 
+_drawn: set[int] = set()  # numbers of the notices that a panel has drawn
+
+
 class BEYOND_MOCAP_PT_notices(bpy.types.Panel):
-    """The pop-up after a failure: what is wrong, what to do, and buttons that do it."""
+    """The pop-up after a failure that no panel shows: what is wrong, what to do, and buttons that do it."""
 
     bl_space_type = "VIEW_3D"
     bl_region_type = "HEADER"
     bl_label = "Beyond Mocap"
     bl_options = {"INSTANCED"}
     bl_ui_units_x = POPUP_WIDTH
+
+    @classmethod
+    def poll(cls, context):
+        """Return whether there is a notice of the last failure that no panel has drawn."""
+        group = context.window_manager.beyond_mocap_notices
+        return any(row.number >= group.shown and row.number not in _drawn for row in group.rows)
 
     def draw(self, context):
         """Draw the notices of the last failure."""
@@ -45,6 +54,7 @@ def draw_notices(layout, context, rooms: tuple[str, ...]) -> None:
     """
     for row in context.window_manager.beyond_mocap_notices.rows:
         if row.room in rooms and row.scene == str(context.scene.session_uid):
+            _drawn.add(row.number)
             draw_notice(layout.box().column(), row, wrap_text)
 
 

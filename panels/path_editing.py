@@ -59,14 +59,14 @@ class BEYOND_MOCAP_PT_path(TabPanel, bpy.types.Panel):
             edit = body.beyond_mocap_ride
             draw_armature(layout, body, edit)
             if edit.on:
+                for line in edit.messages.splitlines():
+                    draw_paragraph(layout, line, "INFO")
                 draw_section(layout, "path_curve", "New Curve",
                              lambda opened: draw_new_curve(opened, context.scene.beyond_mocap))
                 draw_section(layout, "path_following", "Path Following", lambda opened: draw_following(opened, edit))
                 draw_section(layout, "path_body", "Body", lambda opened: draw_body(opened, edit))
                 if figure_text := describe_figures(edit.figures):
                     draw_section(layout, "path_figures", "Figures", lambda opened: draw_figures(opened, figure_text))
-                for line in edit.messages.splitlines():
-                    draw_paragraph(layout, line, "INFO")
         draw_section(layout, "path_cameras", "Cameras & Nudging", lambda opened: draw_cameras(opened, context))
         draw_section(layout, "path_overlays", "Overlays",
                      lambda opened: draw_overlays(opened, context.scene.beyond_mocap.view))

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from ..path_editing.path_edit_settings import PathEditSettings
     from ..path_editing.path_edit_source import PathEditSource
 
-_COMPLETE_SHARE = 0.95  # share of a path that counts as all of it
 _MAX_ROUNDS = 3  # searches for delays and detours at most
 _RAISED = 0.03  # metres of toes above the ground, beyond those of a synthetic gait, from which on takes differ visibly
 _HIP_HEIGHT = 0.9  # metres, rough height of hips above the ground; only decides whether bodies are on one floor
@@ -88,7 +87,7 @@ def run_path(options, reporter: ProgressReporter, writers: Mapping[str, Writer])
     else:
         write(take, options.out)
     _write_tables(options, take, report)
-    reporter.finish((*notes, *changes, *edited.warnings, *_describe_remaining_path(source, edited, path, options)))
+    reporter.finish((*notes, *changes, *edited.warnings))
     distance = float(np.maximum(np.diff(edited.arc), 0.0).sum())  # a repeated path starts again at 0
     print(f"{options.out}: {len(edited.motion)} frames, {edited.motion.duration:.1f} s, {distance:.1f} "
           f"m{_describe_unit(clip, options)}")
@@ -104,16 +103,6 @@ def _describe_raised_toes(source, path, ground) -> list[str]:
         return []
     return [f"toes of flat feet are {100.0 * raised:.1f} cm above the ground, as recorded; in takes they are on it: "
             f"with z_m {-raised:.3f} in the path they are here too"]
-
-
-def _describe_remaining_path(source, edited, path, options) -> list[str]:
-    """Report where the motion ends long before the path."""
-    from ..motion.path.arc_length import ArcLength
-
-    distance, length = float(edited.arc[-1]), ArcLength(path).length
-    if options.cycle or options.end == "repeat" or source.is_still or distance >= _COMPLETE_SHARE * length:
-        return []
-    return [f"the motion ends after {distance:.1f} of {length:.1f} m of the path; --cycle repeats it"]
 
 
 def _describe_unit(clip, options) -> str:

@@ -183,6 +183,8 @@ def _build_timing(source: PathEditSource, path: Path, arc: ArcLength,
     end_mode = "stop" if len(transitions) else settings.end
     end = path_time.find_ending(timing.arc, arc.length, residuals.fps, end_mode, path.closed or source.is_still)
     timing = timing.first(end.count)
+    if not (settings.cycle or path.closed or source.is_still):
+        messages += path_time.report_rest(timing, arc.length, residuals.fps)
     transitions = np.searchsorted(timing.at, transitions - 1e-9)
     return residuals, transitions[transitions < end.count], timing, replace(end, messages=(*messages, *end.messages))
 

@@ -45,7 +45,7 @@ LENGTH_TOLERANCE = 1e-3
 """Metres by which a motion may overshoot the path and still count as of its length."""
 SHORTEST = 1e-6
 """Metres below which a path has no length."""
-_STEP = 0.5  # metres; a shorter path gets a warning
+_STEP = 0.5  # metres; a shorter path gets a warning, and so does a longer rest of a path
 # seconds: shortest lap that is repeated; longest cut end without a warning
 _SHORTEST_LAP, _UNNOTICED_SECONDS = 0.5, 0.1
 
@@ -368,6 +368,15 @@ def find_ending(arc: np.ndarray, length: float, fps: float, end: str = "stop", c
     stops = (line,) if left > _UNNOTICED_SECONDS else ()
     brief = ("the path is too short to restart: a lap takes less than half a second",) if end == "repeat" else ()
     return Ending(count, whole[:count], none, (*stops, *brief, *short))
+
+
+def report_rest(timing: Timing, length: float, fps: float) -> tuple[str, ...]:
+    """Report the rest of a path of `length` metres on which there is no motion any more."""
+    left, end = length - float(timing.arc[-1]), (len(timing.arc) - 1) / fps
+    if left <= _STEP:
+        return ()
+    line = f"the motion ends {left:.1f} m before the end of the path: shorten the path, or switch Cycle on"
+    return (TimedMessage(line, (end, end)),)
 
 
 def _find_start(arc: np.ndarray) -> int:

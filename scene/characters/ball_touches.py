@@ -16,7 +16,7 @@ from ...beyond_mocap.motion.motion import Motion, forward_kinematics
 from ...beyond_mocap.motion.track import BALL_RADIUS
 
 if TYPE_CHECKING:
-    from ...beyond_mocap.synthesis.take import Take
+    from ...beyond_mocap.synthesis.take import DribbleTouch, Take
 
 _AT_BALL = 0.03  # m of gap up to which a part is at the ball, as in `synthesis.resolved_touches`
 _NEAR_SECONDS = 0.5  # around a key moment in which its touch is looked for
@@ -41,6 +41,17 @@ class BallTouch:
     distance: np.ndarray
 
 
+def list_touch_times(take: Take) -> np.ndarray:
+    """List the times (N,) s, on its clock and rising, at which a take's body is to be at the ball."""
+    from ...beyond_mocap.annotation.ball_contact import find_striking_part
+
+    if take.ball is None:
+        return np.zeros(0)
+    frames = [key.frame for key in take.keys if find_striking_part(key.contact_labels)]
+    frames += [_find_middle(push) for push in take.dribble_touches]
+    return take.start_time + np.sort(frames) / take.motion.fps
+
+
 def list_ball_touches(take: Take, motion: Motion, seconds: np.ndarray) -> tuple[BallTouch, ...]:
     """List the touches of the ball in a take.
 
@@ -60,13 +71,17 @@ def list_ball_touches(take: Take, motion: Motion, seconds: np.ndarray) -> tuple[
     fps, pose, found = take.motion.fps, forward_kinematics(motion), []
     wanted = [(take.start_time + key.frame / fps, surface) for key in take.keys
               for surface in build_surfaces(motion.skeleton, key.contact_labels)]
-    wanted += [(take.start_time + 0.5 * (push.first + push.last) / fps, surface) for push in take.dribble_touches
+    wanted += [(take.start_time + _find_middle(push) / fps, surface) for push in take.dribble_touches
                for surface in build_part_surfaces(motion.skeleton, "foot", (push.side,))]
     for moment, surface in wanted:
         touch = _find_touch(surface, pose, ball, seconds, moment)
         if touch is not None:
             found.append(touch)
     return _drop_overlaps(found)
+
+
+def _find_middle(push: DribbleTouch) -> float:
+    return 0.5 * (push.first + push.last)
 
 
 def _find_touch(surface, pose, ball: np.ndarray, seconds: np.ndarray, moment: float) -> BallTouch | None:

@@ -1,9 +1,12 @@
 """What went wrong, kept until it is fixed or dismissed: the line, its fixes as buttons, and the call that failed.
 
+A notice has one place: the panel that it belongs to, or a pop-up at the pointer where no such panel is in front.
+
 The rows are on the window manager: neither saved with a file nor undone. Panels draw them, operators post and clear
 them.
 """
 
+import itertools
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -14,7 +17,7 @@ from bpy.props import BoolProperty, CollectionProperty, IntProperty, StringPrope
 from ...beyond_mocap.base.errors import BeyondMocapError
 from ...beyond_mocap.base.fixes import Fix
 from . import window
-from .live import Watcher
+from .live import Watcher, call_soon
 
 
 class BeyondMocapFix(bpy.types.PropertyGroup):
@@ -46,7 +49,6 @@ class BeyondMocapNotices(bpy.types.PropertyGroup):
 
     attached_to = ("WindowManager.beyond_mocap_notices",)
     rows: CollectionProperty(type=BeyondMocapNotice, description="The notices, the oldest first")
-    count: IntProperty(description="How many there were in this session")
     shown: IntProperty(description="Number of the first notice that the pop-up shows")
 
 
@@ -71,6 +73,8 @@ class Subject:
     arguments: dict = field(default_factory=dict)
 
 
+_numbers = itertools.count(1)  # never twice in a session, whatever files are opened
+REDRAWN_SECONDS = 0.2  # until panels are drawn again with a new notice
 UNITS = {0.001: "Millimetres", 0.01: "Centimetres", 0.0254: "Inches", 1.0: "Metres"}
 
 
@@ -102,7 +106,7 @@ BUTTONS = {  # kind of a fix -> what its button says, from the fix's value, and 
 
 
 def post_notice(scene: bpy.types.Scene, subject: Subject, error: BeyondMocapError, is_error: bool = True) -> int:
-    """Post a notice; it replaces an older one about the same topic, and one of the same fault.
+    """Post a notice; it replaces an older one about the same topic, and one of the same fault, of any player.
 
     Args:
         scene: that it belongs to.
@@ -113,12 +117,11 @@ def post_notice(scene: bpy.types.Scene, subject: Subject, error: BeyondMocapErro
         Its number.
     """
     clear_notices(scene, subject.topic)
-    fault = str(scene.session_uid), subject.player, error.parts[0]
-    _remove_rows(lambda row: (row.scene, row.player, row.found) == fault)
+    fault = str(scene.session_uid), error.parts[0]
+    _remove_rows(lambda row: (row.scene, row.found) == fault)
     group = bpy.context.window_manager.beyond_mocap_notices
-    group.count += 1
     row = group.rows.add()
-    row.number, row.scene, row.name, row.is_error = group.count, str(scene.session_uid), subject.title, is_error
+    row.number, row.scene, row.name, row.is_error = next(_numbers), str(scene.session_uid), subject.title, is_error
     row.topic, row.room, row.player, row.operator = subject.topic, subject.room, subject.player, subject.operator
     row.arguments = json.dumps(subject.arguments)
     row.found, row.step = error.parts
@@ -188,11 +191,18 @@ def find_operator(name: str):
 
 
 def show_notices(first: int) -> None:
-    """Show the notices from a number on in a pop-up at the pointer; nothing without a window."""
-    if bpy.app.background or bpy.context.window is None:
-        return
+    """Show the notices from a number on in a pop-up at the pointer, unless a panel shows them; nothing without a
+    window.
+    """
     bpy.context.window_manager.beyond_mocap_notices.shown = first
-    bpy.ops.wm.call_panel("INVOKE_DEFAULT", name="BEYOND_MOCAP_PT_notices", keep_open=False)
+    call_soon(_open_popup, REDRAWN_SECONDS)
+
+
+def _open_popup() -> None:
+    """Open the pop-up in the window of the scene; its `poll` knows what the panels have drawn since."""
+    windows = bpy.context.window_manager.windows
+    with bpy.context.temp_override(window=bpy.context.window or windows[0]):
+        bpy.ops.wm.call_panel("INVOKE_DEFAULT", name="BEYOND_MOCAP_PT_notices", keep_open=False)
 
 
 def _remove_rows(is_meant: Callable[[BeyondMocapNotice], bool]) -> None:

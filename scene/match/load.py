@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...beyond_mocap.appearance.sports import FOOTBALL, load_sports
-from ...beyond_mocap.base.errors import InputError, UserCancelledError, format_seconds
+from ...beyond_mocap.base.errors import InputError, UserCancelledError, format_count, format_seconds
 from ...beyond_mocap.base.fixes import Fix
 from ...beyond_mocap.motion.motion import Motion
 from ...beyond_mocap.motion.track.ball_path import BallPath
@@ -60,6 +60,7 @@ class MatchSection:
         characters: players and referees who are present.
         ball: where it is known, else None.
         sport: whose pitch it is.
+        quality: how many targets the players meet, "" where no player has a report.
     """
 
     start: float
@@ -70,6 +71,7 @@ class MatchSection:
     characters: tuple[Character, ...]
     ball: BallPath | None
     sport: str = FOOTBALL
+    quality: str = ""
 
 
 @dataclass(frozen=True)
@@ -129,7 +131,8 @@ def load_section(request: DisplayRequest, library: "Library | None", progress: C
         raise InputError(request.folder, found, "a time of play", *lines[:1])
     length, width = map(float, state["pitch_m"])
     section = MatchSection(start, end, length, width=width, colours=request.colours, characters=tuple(characters),
-                           ball=_cut_ball(ball, start, end), sport=_find_sport(state))
+                           ball=_cut_ball(ball, start, end), sport=_find_sport(state),
+                           quality=_describe_quality(request.folder, characters))
     return library, section, tuple(lines)
 
 
@@ -145,6 +148,23 @@ def _read_state(folder: str) -> dict:
         raise InputError(Path(folder) / STATE, "times, pitch or a player's file are missing", "the state of a match",
                          "choose another folder for the match")
     return state
+
+
+def _describe_quality(folder: str, characters: list[Character]) -> str:
+    """Describe how many of their targets the characters meet, by their reports of the whole match."""
+    from ...beyond_mocap.evaluation.report import judge_figures
+    from ...beyond_mocap.match.report.results import read_match_results
+
+    shown, met = {person.id for person in characters}, {}
+    for player in read_match_results(Path(folder)).players:
+        is_met = [row.status == "met" for row in judge_figures(player.report) if row.status]
+        if player.id in shown and is_met:
+            met[player.display_name] = is_met
+    if not met:
+        return ""
+    share, worst = np.mean(sum(met.values(), [])), min(met, key=lambda name: np.mean(met[name]))
+    text = f"{100.0 * share:.0f} % of the targets met by {format_count(len(met), 'player')}"
+    return f"{text}, fewest by {worst} ({100.0 * np.mean(met[worst]):.0f} %)" if len(met) > 1 else text
 
 
 def _find_sport(state: dict) -> str:

@@ -109,6 +109,7 @@ class BeyondMocapMatch(bpy.types.PropertyGroup):
     length_s: FloatProperty(options={"HIDDEN"}, description="End of the match on its clock, in seconds")
     report: StringProperty(options={"HIDDEN"}, description="Messages about the data: detected and corrected values")
     messages: StringProperty(options={"HIDDEN"}, description="Status and warnings")
+    quality: StringProperty(options={"HIDDEN"}, description="How many targets the displayed players meet")
     made: StringProperty(options={"HIDDEN"}, description="Folder of the last result if none is chosen")
     shown_start: FloatProperty(options={"HIDDEN"}, description="Match second of the first displayed frame")
     shown_first: IntProperty(options={"HIDDEN"}, description="First displayed frame")

@@ -10,8 +10,11 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.base.digest import byte_digest
-from ...beyond_mocap.base.errors import BeyondMocapError, InputError
-from ..core import channels, take_record
+from ...beyond_mocap.base.errors import BeyondMocapError, InputError, format_count
+from ...beyond_mocap.motion.motion import Motion, compute_pose, sample_frames
+from ..characters.ball_touches import list_touch_times
+from ..core import channels, session, take_record
+from ..core.measure import build_scene_clock
 from ..core.saved_state import discard_saved_state, restore_nla
 from . import curve, keys
 from .armature_adapter import MARK, clear_source_cache, invalidate_sources, read_source
@@ -19,6 +22,7 @@ from .rigs import choose_adapter
 from .settings import collect_options, list_edited_bodies, select_object
 
 _SAMPLES = 400
+_AT_BALL = 0.05  # metres of a body away from its place up to which it still meets the ball
 MOST_FRAMES = 40_000  # of a cycled motion, about: it is computed at every change, and more would take minutes
 
 
@@ -128,7 +132,8 @@ def update_motion(scene: bpy.types.Scene, body: bpy.types.Object, force: bool = 
     _counter += 1
     first, fps = known.read.first, known.read.motion.fps
     messages = "\n".join((*drawn.notes, *curve.list_ground_messages(edit.ground), *known.read.messages,
-                          *edited.warnings))
+                          *edited.warnings, *_report_lost_touches(scene, body, known.core.motion, edited.motion,
+                                                                  first=first)))
     now = ComputedEdit(first, fps, known.core, path=path, edited=edited, number=_counter, messages=messages)
     _computed[body.session_uid] = digest, now
     store_messages(edit, _build_messages(scene, edit, digest, now), _summarize_figures(known.core, edited))
@@ -145,6 +150,36 @@ def _build_messages(scene: bpy.types.Scene, edit, digest: str, now: ComputedEdit
     if edit.agreed not in ("", digest):
         lines.append("changed since Avoid Collisions: press it again")
     return "\n".join(lines)
+
+
+def _report_lost_touches(scene: bpy.types.Scene, body: bpy.types.Object, original: Motion, edited: Motion,
+                         first: int) -> tuple[str, ...]:
+    """Report where a body no longer meets its player's ball, which stays in its place.
+
+    Args:
+        scene: of the players.
+        body: the edited armature.
+        original, edited: its motion before and after, both from the scene frame `first` on.
+    """
+    players = scene.beyond_mocap.players
+    player = next((one for one in players if body in (one.body, one.character_body, one.rig)), None)
+    stored = session.find_take(player.take) if player is not None else None
+    touches = list_touch_times(stored.take) if stored is not None else ()
+    if not len(touches):
+        return ()
+    frames = build_scene_clock(scene).to_frame(touches) - first
+    lost = frames[(_measure_offset(original, edited, frames) > _AT_BALL) | (frames > len(edited) - 1)]
+    if not len(lost):
+        return ()
+    count = f"{len(lost)} of {format_count(len(touches), 'touch', 'touches')}"
+    return (f"the body no longer meets the ball at {count}, first at frame {first + lost[0]:.0f}; the ball stays where "
+            "it is: bend the path after the touches, or press Revert and edit the player's track",)
+
+
+def _measure_offset(original: Motion, edited: Motion, frames: np.ndarray) -> np.ndarray:
+    """Measure the mean distance (N,) m of the joints of two motions at fractional frames (N,)."""
+    before, after = (compute_pose(motion.skeleton, *sample_frames(motion, frames))[0] for motion in (original, edited))
+    return np.linalg.norm(after - before, axis=-1).mean(axis=-1)
 
 
 def _check_length(known, path, settings) -> None:

@@ -4,6 +4,8 @@ them.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import bpy
 import numpy as np
 
@@ -26,12 +28,12 @@ def post_difference(scene: bpy.types.Scene) -> None:
 def describe_difference(scene: bpy.types.Scene) -> InputError | None:
     """Describe which shown players have another ball than the one that the scene's ball follows; None for none."""
     settings = scene.beyond_mocap
-    shown = [(player.name, stored.plan.track) for player in settings.players if player.result.state != "NONE"
+    shown = [(player.name, player.take) for player in settings.players if player.result.state != "NONE"
              and (stored := session.find_take(player.take)) is not None and stored.take.ball is not None]
     if len(shown) < 2 or not settings.make_ball:
         return None
     (first, leading), *others = shown
-    distances = {name: _measure_distance(leading, track) for name, track in others}
+    distances = {name: _measure_distance(leading, take) for name, take in others}
     found = {name: distance for name, distance in distances.items() if distance}
     if not found:
         return None
@@ -42,11 +44,13 @@ def describe_difference(scene: bpy.types.Scene) -> InputError | None:
                       "their touches meet their own ball only: show them alone, or give all tracks one ball")
 
 
-def _measure_distance(leading, track) -> float:
-    """Measure the largest distance, m, of a track's ball from that of the leading track; 0 where it is the same ball.
+@lru_cache(maxsize=session.MAX_TAKES)
+def _measure_distance(leading: str, take: str) -> float:
+    """Measure the largest distance, m, of the ball in a take's track from that in the leading take's; 0 where it is the
+    same ball. Takes never change under their name, and each take that is shown asks about all others.
     """
-    times, places = track.known_ball
-    leading_times, leading_places = leading.known_ball
+    (leading_times, leading_places), (times, places) = (
+        session.find_take(name).plan.track.known_ball for name in (leading, take))
     if not len(times) or not len(leading_times):
         return 0.0
     distances = np.linalg.norm(interpolate_columns(times, leading_times, leading_places) - places, axis=1)

@@ -162,8 +162,6 @@ def check_player(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> tuple[lis
     if not player.take:
         return [], [], ""
     lines, settings, operator = [], scene.beyond_mocap, "update"
-    if session.find_take(player.take) is None:
-        lines.append("the take is not in this session: Update computes it again and keeps manual keys")
     try:
         plan, _ = plans.build_plan(settings, player, still=True)
         folder = to_absolute_path(settings.library_folder)
@@ -193,15 +191,18 @@ def _describe_body_problem(scene: bpy.types.Scene, player: BeyondMocapPlayer) ->
 
 
 def _describe_notes(player: BeyondMocapPlayer) -> list[str]:
-    """Describe how many manual keys the result has."""
-    body = player.body
+    """Describe whether the take is in this session, and how many manual keys the result has."""
+    body, notes = player.body, []
+    if session.find_take(player.take) is None:
+        notes.append("the file was opened again: Update computes the take once more, for overlays, contacts and "
+                     "Resynthesize Stretch")
     if body is None or player.result.state == "NONE":
-        return []
+        return notes
     key = (body.session_uid, player.take, player.result.state)
     if bpy.app.background or key not in _now["hand"]:  # without a window no handler reports changes
         _now["hand"][key] = len(hand_keys.find_in_body(body)[0])
     count = _now["hand"][key]
-    return [f"{format_count(count, 'manual key')}: kept by Update"] if count else []
+    return [*notes, f"{format_count(count, 'manual key')}: kept by Update"] if count else notes
 
 
 def mark_dirty(*_) -> None:

@@ -4,7 +4,8 @@ These properties are on the armature's data with an action of their own, so that
 show in the Graph Editor whenever the armature is selected. They belong to the displayed take. Columns of the lines are
 separated by tabs:
 
-- quality: name and value ("Foot slide: 1.2 cm/s"), target, status ("met", "missed" or ""; as in `evaluation.report`)
+- quality: name and value ("Foot slide: 1.2 cm/s"), target, status ("met", "missed" or ""; as in `evaluation.report`),
+  and of figures that count events a minute how many there are in the take
 - moments: text, seconds, status
 - warnings: text, seconds at which its spans start, separated by blanks ("" without a time)
 """
@@ -65,6 +66,8 @@ FIGURES = (  # name, key path in the report, factor (a negative one counts from 
     ("Other labels shown", "touches.substituted_count", 1, "{:.0f}", ""),
     ("Computing time", "seconds.total", 1, "{:.1f}", " s"),
 )
+EVENT_RATES = {f"naturalness.{name}_per_min"  # events a minute of the whole take
+               for name in ("snap_turns", "spins", "unasked_spins", "pelvis_drops", "jolts", "cuts")}
 ERROR_GROUP, ERROR_MARK = "Beyond Mocap", "beyond_mocap_error_curves"
 CURVES = (  # name, tooltip
     ("Root Error (cm)", "Distance of root and track, both smoothed over 1.5 s; the target is 1.5 cm for 95 %"),
@@ -97,7 +100,10 @@ def describe_quality(report: Mapping) -> str:
                        if len(limits_text) == 1
                        else " .. ".join(limits_text))
         status = "" if is_met is None else ("met" if is_met else "missed")
-        lines.append("\t".join((f"{name}: {form.format(_scale_value(value, factor))}{unit}", target_text, status)))
+        columns = [f"{name}: {form.format(_scale_value(value, factor))}{unit}", target_text, status]
+        if path in EVENT_RATES and report.get("duration_s"):
+            columns.append(f"{value * float(report['duration_s']) / 60.0:.0f}")
+        lines.append("\t".join(columns))
     return "\n".join(lines)
 
 

@@ -1,5 +1,6 @@
 """Key moments in the NLA editor and the dope sheet: a diamond on their track with the name beside it, where Blender
-draws only ticks. Names without room there, or without a row, stand at the foot of the editor.
+draws only ticks. Names without room there, or without a row, stand at the foot of the editor: the active player's, and
+those of other selected objects where no rows are in view.
 
 The same layout serves for drawing and for finding what was clicked.
 """
@@ -98,12 +99,15 @@ def list_names(context: bpy.types.Context, region: bpy.types.Region, middles: di
     scene_names = _list_placed(context, region, middles)
     on_tracks = _place_on_tracks([one for one in scene_names if one.y is not None], region.width, scale)
     shown = {target.name for target in list_shown_targets(context)}
+    if middles and (active := strips.find_target(context)) is not None:
+        shown = {active.name}  # of others they would stand over the rows
     rest = [one for one in on_tracks if not one.text] + [one for one in scene_names if one.y is None]
     return on_tracks + _place_at_foot([one for one in rest if one.target in shown], region, scale)
 
 
 def list_shown_targets(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """List the objects whose names may stand at the foot: the active player's dot and selected ones."""
+    """List the objects whose names may stand at the foot: the active player's dot and, without any rows, selected ones.
+    """
     chosen = {target.name: target for target in context.selected_objects if lanes.has_label_tracks(target)}
     active = strips.find_target(context)
     if active is not None:

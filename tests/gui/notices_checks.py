@@ -1,4 +1,5 @@
-"""What fails is told in a pop-up with its fixes, and stays in the panel; a fix mends it, and what failed runs again."""
+"""What fails is told in the tab with its fixes, or in a pop-up where the tab is not in front; a fix mends it, and what
+failed runs again."""
 
 import bpy
 from tab import (
@@ -20,16 +21,16 @@ def list_notices():
     return list(bpy.context.window_manager.beyond_mocap_notices.rows)
 
 
-def open_track(labels, name="heldout1_labels.txt"):
+def open_track(labels, tab="View"):
     """A track, and labels beside it under another name; the sample's library."""
     bpy.ops.wm.read_homefile(app_template="")
     yield 1.0
     FOLDER.mkdir(exist_ok=True)
     rows = "".join(f"{tenth / 10:.1f},{0.2 * tenth:.2f},0.1\n" for tenth in range(41))
     (FOLDER / "heldout1_track.csv").write_text(f"time_s,x_m,y_m\n{rows}")
-    (FOLDER / name).write_text(labels)
+    (FOLDER / "heldout1_labels.txt").write_text(labels)
     get_settings().library_folder = str(copy_sample() / "library")
-    yield from window.open_tab(window.find_area("VIEW_3D"), TAB)
+    yield from window.open_tab(window.find_area("VIEW_3D"), tab)
     yield from window.move_pointer(700, 600)
     run_operator("beyond_mocap.import_tracking", directory=f"{FOLDER}/", files=[{"name": "heldout1_track.csv"}])
     yield 0.7
@@ -70,15 +71,14 @@ def check_use_nearest_labels_from_the_popup():
     assert get_settings().nearest and not list_notices()
 
 
-def check_it_stays_in_the_panel_until_it_is_dismissed():
-    yield from open_track("2.4 scissors left back\n")
+def check_the_tab_in_front_is_its_one_place_until_it_is_dismissed():
+    yield from open_track("2.4 scissors left back\n", TAB)
     yield from use_labels()
     run_operator("beyond_mocap.synthesize")
     yield from wait_until(list_notices, 300.0, "it fails")
     yield from wait_until_settled()
-    yield from window.press_key("ESC")
-    yield 0.5
-    window.save_picture(PICTURES / "notice-panel.png")
+    yield 1.0
+    window.save_picture(PICTURES / "notice-panel.png")  # without a pop-up, which would take the click
     yield from click_operator("apply_fix", "index=1")
     yield from wait_until(lambda: get_settings().task == "LIBRARY", 10.0, "the clips are shown")
     yield from wait_until_settled()

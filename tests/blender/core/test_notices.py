@@ -7,6 +7,7 @@ import bpy
 import pytest
 import worlds
 from conftest import EXTENSION
+from fake_layout import FakeLayout, create_context
 
 SMALL = Path(__file__).resolve().parents[3] / "sample_blend" / "match" / "small"
 
@@ -64,6 +65,30 @@ def test_one_fault_is_shown_once_whatever_fails_by_it(places):
     assert [row.operator for row in list_notices()] == ["beyond_mocap.build_library"]
     bpy.context.scene.beyond_mocap.library_folder = str(places.clips)
     assert bpy.ops.beyond_mocap.build_library() == {"FINISHED"} and list_notices() == []
+
+
+def test_one_fault_of_several_players_is_one_notice():
+    import importlib
+
+    notices, errors = (importlib.import_module(f"{EXTENSION}.{name}") for name in ("scene.core.notices",
+                                                                                   "beyond_mocap.base.errors"))
+    for player, found in (("player1", "no such folder"), ("player2", "no such folder"), ("player2", "is a file")):
+        subject = notices.Subject(topic=f"take {player} {found}", room="synthesis", title="Synthesize", player=player)
+        notices.post_notice(bpy.context.scene, subject, errors.InputError("/nowhere", found))
+    assert [row.found for row in list_notices()] == ["/nowhere: no such folder", "/nowhere: is a file"]
+
+
+def test_a_panel_that_shows_a_notice_leaves_nothing_to_the_popup(lacking, monkeypatch):
+    import importlib
+
+    panels = importlib.import_module(f"{EXTENSION}.panels.notices")
+    create_context(monkeypatch)  # a sidebar with a width
+    bpy.context.window_manager.beyond_mocap_notices.shown = list_notices()[-1].number
+    assert panels.BEYOND_MOCAP_PT_notices.poll(bpy.context)
+    panels.draw_notices(FakeLayout(), bpy.context, ("library",))
+    assert panels.BEYOND_MOCAP_PT_notices.poll(bpy.context)
+    panels.draw_notices(FakeLayout(), bpy.context, ("synthesis",))
+    assert not panels.BEYOND_MOCAP_PT_notices.poll(bpy.context)
 
 
 def test_use_nearest_labels_synthesizes_again(lacking):

@@ -3,6 +3,7 @@
 import importlib
 import json
 import pathlib
+import re
 import shutil
 
 import bpy
@@ -209,6 +210,8 @@ def test_a_match_made_while_another_scene_is_shown_is_not_lost(place, made):
     assert not other.objects and not scene.objects
     bpy.context.window.scene = scene
     assert bpy.ops.beyond_mocap.show_match() == {"FINISHED"} and room("match_objects").find_armatures(scene)
+    count = len(seen[1].characters)
+    assert re.match(rf"\d+ % of the targets met by {count} players, fewest by .* \(\d+ %\)$", match.quality)
 
 
 def test_an_end_before_the_start_is_told_before_anything_is_made(place, tmp_path):

@@ -207,7 +207,7 @@ def test_accepted_results_still_know_where_they_lay(shown, room, form):
 def test_lines_of_the_report_keep_their_seconds(shown):
     player = shown.players[0]
     names = [line.split(":")[0] for line in player.quality.splitlines()]
-    assert "Foot slide" in names and all(len(line.split("\t")) == 3 for line in player.quality.splitlines())
+    assert "Foot slide" in names and all(len(line.split("\t")) in (3, 4) for line in player.quality.splitlines())
     root = next(line for line in player.quality.splitlines() if line.startswith("Distance to track:"))
     assert root.split("\t")[1:] == ["≤ 0.50", "met"]
     text, second, status = player.moments.splitlines()[0].split("\t")
@@ -268,6 +268,8 @@ def test_events_are_lines_that_go_to_their_second(shown, room):
         "Snap turns: 2.0 /min\t≤ 0.6\tmissed", "Spins: 0.2 /min\t≤ 0.3\tmet",
         "Both feet down standing: 90 %\t≥ 80\tmet", "Foot speed at receptions: 7.5 m/s\t≤ 3.0\tmissed",
         "Ball inside the body: 0 frames\t≤ 0\tmet"]
+    assert quality.describe_quality({**report, "duration_s": 30.0}).splitlines()[:2] == [  # and how many there are
+        "Snap turns: 2.0 /min\t≤ 0.6\tmissed\t1", "Spins: 0.2 /min\t≤ 0.3\tmet\t0"]
 
 
 def test_jump_at_another_frame_rate(shown):

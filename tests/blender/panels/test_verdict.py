@@ -26,6 +26,9 @@ def judge(extension):
         ("Spins not asked for", "0.0", "1.5 /min", "3.0 /min"), ("Second strikes", "0", "1", "2"),
         ("Feet out of reach", "0.0", "0.4 %", "6.0 %"), ("Ball inside the body", "0", "2 frames", "12 frames"),
     ) for value, word in ((fair, "Fair"), (poor, "Poor"))),
+    ("Jolts: 15.0 /min\t≤ 1.0\tmissed\t1", "Fair"),  # in 4 s: one event is no rate, and still no good take
+    ("Jolts: 30.0 /min\t≤ 1.0\tmissed\t2", "Poor"),
+    ("Jolts: 6.0 /min\t≤ 1.0\tmissed\t4", "Fair"),
     ("\n".join(f"Other {number}: 6\t≤ 1\tmissed" for number in range(3)), "Fair"),
     ("\n".join(f"Other {number}: 6\t≤ 1\tmissed" for number in range(21)), "Poor"),
     ("Computing time: 1.7 s\t\t", "Good"),

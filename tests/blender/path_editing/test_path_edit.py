@@ -7,6 +7,7 @@ import pathlib
 import bpy
 import numpy as np
 import pytest
+import worlds
 from undo import assert_one_step
 
 SAMPLE = pathlib.Path(__file__).resolve().parents[3] / "sample_blend" / "library"
@@ -121,7 +122,7 @@ def test_the_body_goes_where_the_curve_is(scene, part):
             drawn.data.splines[0].bezier_points[1].co.x += 0.3
         bpy.context.view_layer.update()
         assert live.update_all(scene) == 1 and live.update_all(scene) == 0
-        assert body.beyond_mocap_ride.messages == ""
+        assert body.beyond_mocap_ride.messages.startswith("the motion ends") is (edit != "point")  # the path is longer
         assert max(to_path(riders, body, frame) for frame in (1, 15, 30)) < 0.12
     assert pelvis(body, 10)[2] > 1.5
 
@@ -778,3 +779,22 @@ def test_a_new_curve_takes_back_the_line_about_the_one_before(scene, part):
     bpy.ops.beyond_mocap.path_curve(shape="FITTED")
     follow(scene)
     assert ride.messages == ""
+
+
+def test_a_bent_path_reports_its_rest_and_touches_that_no_longer_meet_the_ball(scene, tmp_path, library_folder):
+    places = worlds.make_places(tmp_path)
+    worlds.import_tracking(places)
+    scene.beyond_mocap.library_folder = str(library_folder)
+    bpy.ops.beyond_mocap.synthesize(player="player1")
+    body = scene.beyond_mocap.players[0].body
+    choose(body)
+    bpy.ops.beyond_mocap.edit_path()
+    edit = body.beyond_mocap_ride
+    assert edit.messages == ""
+    points = edit.curve.data.splines[0].bezier_points
+    points[-1].co.y += 2.0  # after the kick
+    bpy.ops.beyond_mocap.update_path()
+    assert "before the end of the path: shorten the path" in edit.messages and "ball" not in edit.messages
+    points[0].co.y -= 2.0
+    bpy.ops.beyond_mocap.update_path()
+    assert "no longer meets the ball at 1 of 1 touch, first at frame 73;" in edit.messages

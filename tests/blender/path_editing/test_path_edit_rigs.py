@@ -2,6 +2,7 @@
 bones that are seen, what was before comes back, and what cannot be done is said."""
 
 import importlib
+import re
 
 import bpy
 import numpy as np
@@ -13,6 +14,7 @@ from test_rigs import rigify  # noqa: F401  (a fixture)
 from undo import assert_one_step
 
 STEP = 6
+IS_LONGER = "the motion ends .* m before the end of the path: .*"  # the only line about a bent path
 
 
 @pytest.fixture
@@ -238,7 +240,7 @@ def test_a_rig_on_its_path_is_saved_and_opened(part, recorded, tmp_path, kind):
     bpy.ops.wm.open_mainfile(filepath=file)
     rig, scene = bpy.data.objects["Rig"], bpy.context.scene
     assert part("path_editing.live").update_all(scene) == 1  # the original is looked at again
-    assert rig.beyond_mocap_ride.messages == ""
+    assert re.fullmatch(IS_LONGER, rig.beyond_mocap_ride.messages)
     np.testing.assert_allclose(shown(rig, [5, 20, 40]), was, atol=1e-5)
     rig.beyond_mocap_ride.curve.location.z += 0.5
     bpy.context.view_layer.update()
@@ -346,7 +348,7 @@ def test_muted_curves_stay_muted_and_half_frames_other_slots_and_drivers_are_kep
     upper = ["pelvis", "spine_01", "head", "neck_01", "hand_l"]
     was = shown(rig, frames, upper)
     bend(scene, start(rig, plant=False, lean=False), part)
-    assert rig.beyond_mocap_ride.messages == ""
+    assert re.fullmatch(IS_LONGER, rig.beyond_mocap_ride.messages)
     np.testing.assert_allclose(rigid(shown(rig, frames, upper)), rigid(was), atol=1e-4)
     made, slot = channels.find_playing_action(rig)
     assert len(made.slots) == 1 and len(action.slots) == 2

@@ -84,7 +84,8 @@ def test_the_library_on_disk(renew, made, ready, tmp_path):  # noqa: F811
     assert renew().lines == ""
 
 
-def test_after_the_file_was_opened_again_update_makes_the_same_bits(renew, made, session, tmp_path):  # noqa: F811
+def test_after_the_file_was_opened_again_update_makes_the_same_bits(renew, made, session, tmp_path,  # noqa: F811
+                                                                      capfd):
     bpy.ops.beyond_mocap.resynthesize_stretch(player=made.name, start=3.0, end=5.0)
     bpy.ops.beyond_mocap.resynthesize_stretch(player=made.name, start=8.0, end=9.5)
     bpy.ops.beyond_mocap.accept()
@@ -94,9 +95,12 @@ def test_after_the_file_was_opened_again_update_makes_the_same_bits(renew, made,
     session.clear_session()
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "kept.blend"))
     player = bpy.context.scene.beyond_mocap.players[0]
-    assert "not in this session" in renew().lines and "1 manual key:" in renew().notes
+    assert renew().lines == renew().mend == ""  # nothing has changed, so nothing is out of date
+    assert "opened again: Update computes the take" in renew().notes and "1 manual key:" in renew().notes
     assert player.result.state == "ACCEPTED"
+    capfd.readouterr()
     bpy.ops.beyond_mocap.update()
+    assert f"Nothing has changed: {player.name}" in capfd.readouterr().out
     after = session.find_take(player.take).take
     np.testing.assert_array_equal(after.motion.rotations, before.motion.rotations)
     np.testing.assert_array_equal(after.motion.root_positions, before.motion.root_positions)

@@ -3,10 +3,12 @@ a picture, names without overlaps, and what the library offers."""
 
 import importlib
 import itertools
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
 import pytest
+import worlds
 
 BACK, BLACK, ORANGE = (48, 48, 48), (13, 13, 13), (255, 140, 0)
 
@@ -199,3 +201,24 @@ def test_the_library_is_counted(tmp_path, room, core):
     assert "nearest: kick" in offers.describe_offer(scene, ("kick", "bicycle"), False)
     assert offers.describe_offer(scene, ("jogging", "dribble"), True) == "1 clip has jogging dribble"
     assert offers.describe_offer(scene, ("scissors", "jogging"), True).startswith("0 clips; nearest: jogging")
+
+
+def test_names_of_other_players_stand_at_the_foot_only_where_no_rows_are_in_view(tmp_path, room):
+    """The active player's rows are in view, and those of the other, who is selected too, are not."""
+    worlds.import_tracking(worlds.make_places(tmp_path))
+    first, second = bpy.context.scene.beyond_mocap.players
+    room("timeline.strips").add_moment(bpy.context, second, 1.0, ("kick",))
+    worlds.select_objects(second.dot, first.dot)
+    bpy.context.scene.beyond_mocap.active_player = 0
+    region = SimpleNamespace(width=900, height=240, view2d=SimpleNamespace(region_to_view=lambda x, y: (0.15 * x, y)))
+    context = SimpleNamespace(scene=bpy.context.scene, view_layer=bpy.context.view_layer, active_object=first.dot,
+                              selected_objects=[first.dot, second.dot], window_manager=bpy.context.window_manager,
+                              preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)))  # 0 without a window
+    rows = {(first.dot.name, track.name): 100.0 for track in first.dot.animation_data.nla_tracks}
+
+    def list_feet(middles):
+        names = room("timeline.moment_names").list_names(context, region, middles)
+        return sorted(one.text for one in names if one.is_at_foot)
+
+    assert list_feet({}) == ["player1: kick right running low inside", "player2: kick"]
+    assert list_feet(rows) == []
