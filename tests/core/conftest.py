@@ -47,6 +47,15 @@ def pytest_collection_modifyitems(items):
         item.add_marker(pytest.mark.xdist_group(room))
 
 
+gc.disable()  # while tests are collected, of which none is garbage
+
+
+def pytest_collection_finish():
+    """Let the garbage collector pass over what stays to the end: the tests, their code and what they import."""
+    gc.freeze()
+    gc.enable()
+
+
 def pytest_sessionfinish():
     """Collect garbage before a worker says that it is done. Pytest does it five times more, and execnet interrupts
     a worker that then takes longer than five seconds; what is left now is not looked at again."""
