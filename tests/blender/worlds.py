@@ -58,20 +58,24 @@ def make_places(top):
 
 def restore_folder(folder, untouched):
     """Give a library's folder its own files again and no others, as in its copy. What the operator before has left
-    there would make another library of it, for which all work is done again. Its cache stays, where it is one."""
+    there would make another library of it, for which all work is done again. Its cache, whose files are in use, stays
+    where it is one."""
     cache = folder / CACHE
-    if _stamp_files(folder) != _stamp_files(untouched) or not cache.is_dir():
-        for path in folder.iterdir():
-            if path.is_file():
-                path.unlink()
-            elif path != cache:
-                shutil.rmtree(path)
-        shutil.copytree(untouched, folder, dirs_exist_ok=True)
+    if cache.is_dir() and _stamp_files(folder) == _stamp_files(untouched):
+        return
+    for path in folder.iterdir():
+        if path.is_file():
+            path.unlink()
+        elif path != cache:
+            shutil.rmtree(path)
+    kept = shutil.ignore_patterns(CACHE) if cache.is_dir() else None
+    shutil.copytree(untouched, folder, ignore=kept, dirs_exist_ok=True)
 
 
 def _stamp_files(folder):
     """Name, size and time of all in a folder but its cache."""
-    return {(path.name, path.stat().st_size, path.stat().st_mtime_ns) for path in folder.iterdir() if path.name != CACHE}
+    found = [path for path in folder.iterdir() if path.name != CACHE]
+    return {(path.name, path.stat().st_size, path.stat().st_mtime_ns) for path in found}
 
 
 def write_synthetic_markers():
