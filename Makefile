@@ -55,7 +55,7 @@ training:
 # Blender's beside the older Blender and the matrix of operators, which are shown when they are done. Linear algebra
 # takes no threads of its own: they would wait for the other's. Where there are two Blenders, each tries half of all
 # pairs of an operator and an awkward situation, and the older one leaves out slow tests that reach nothing new.
-OPERATORS = tests/blender/test_every_operator.py
+MATRIX = test_every_operator.py::test_in_an_awkward_situation_it_works_or_says_what_to_do
 test test-core test-blender test-rooms test-operators test-oldest: export OPENBLAS_NUM_THREADS = 1
 test test-core test-blender test-rooms test-operators test-oldest: export OMP_NUM_THREADS = 1
 test: venv venv-oldest training
@@ -94,10 +94,10 @@ test-training: training
 test-blender: test-rooms test-operators
 
 test-rooms: venv
-	.venv/bin/python $(PYTEST) tests/blender --ignore=$(OPERATORS)
+	.venv/bin/python $(PYTEST) tests/blender --deselect $(MATRIX)
 
 test-operators: venv
-	.venv/bin/python $(PYTEST) $(OPERATORS)
+	.venv/bin/python $(PYTEST) tests/blender/$(MATRIX)
 
 test-oldest: venv-oldest
 	@if [ -e .venv-4.5 ]; then set -x; .venv-4.5/bin/python $(PYTEST) tests/blender; fi

@@ -594,6 +594,7 @@ def stages(session, work_once, library_folder, tmp_path_factory):
     for name, go_on in worlds.STAGES.items():
         go_on(places)
         bpy.ops.wm.save_as_mainfile(filepath=str(top / f"{name}.blend"))
+    shutil.copytree(places.clips, top / "untouched")
     return top, places
 
 
@@ -603,7 +604,7 @@ def begin(stages):
     top, places = stages
 
     def opened(name):
-        (places.clips / ".beyond_mocap").is_file() and (places.clips / ".beyond_mocap").unlink()
+        worlds.restore_folder(places.clips, top / "untouched")
         row = ROWS[name]
         bpy.ops.wm.open_mainfile(filepath=str(top / f"{row.begin}.blend"))
         bpy.context.scene.beyond_mocap_stream.port = find_free_port()

@@ -18,6 +18,7 @@ CLIPS = ("standing_1", "walking_1_2", "walk_jog_walk", "jogging_2_9", "jogging_t
          "receive_foot", "dribble_jogging")
 _markers = tempfile.TemporaryDirectory(prefix="beyond-mocap-markers-")
 MARKERS = pathlib.Path(os.environ.get("TESTS_CACHE") or _markers.name, "markers")
+CACHE = ".beyond_mocap"
 PICTURE = "video_0001.png"
 FOREIGN = "foreign.blend"
 
@@ -53,6 +54,28 @@ def make_places(top):
     picture.filepath_raw, picture.file_format = str(places.match / PICTURE), "PNG"
     picture.save()
     return places
+
+
+def restore_folder(folder, untouched):
+    """Give a library's folder its own files again and no others, as in its copy. What the operator before has left
+    there would make another library of it, for which all work is done again. Its cache, whose files are in use, stays
+    where it is one."""
+    cache = folder / CACHE
+    if cache.is_dir() and _stamp_files(folder) == _stamp_files(untouched):
+        return
+    for path in folder.iterdir():
+        if path.is_file():
+            path.unlink()
+        elif path != cache:
+            shutil.rmtree(path)
+    kept = shutil.ignore_patterns(CACHE) if cache.is_dir() else None
+    shutil.copytree(untouched, folder, ignore=kept, dirs_exist_ok=True)
+
+
+def _stamp_files(folder):
+    """Name, size and time of all in a folder but its cache."""
+    found = [path for path in folder.iterdir() if path.name != CACHE]
+    return {(path.name, path.stat().st_size, path.stat().st_mtime_ns) for path in found}
 
 
 def write_synthetic_markers():
@@ -206,7 +229,7 @@ def missing_files(places, arguments):
 
 def nothing_can_be_written(places, arguments):
     """Every path of the call lies below a file, and so does the library's cache."""
-    cache = places.clips / ".beyond_mocap"
+    cache = places.clips / CACHE
     shutil.rmtree(cache, ignore_errors=True)
     cache.write_text("not a folder")
     return {name: _move_path(value, places.nowhere) for name, value in arguments.items()}

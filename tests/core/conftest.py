@@ -32,19 +32,41 @@ from beyond_mocap.synthetic.moves import build_get_up
 
 SPEEDS = {"stand": (0.0, "standing"), "walk": (1.4, "walking"), "jog": (2.8, "jogging"), "run": (5.0, "running")}
 KICK = "kick low inside right"
+LONGEST = ("synthesis", "markers", "match", "library", "evaluation", "passes", "throws", "synthetic", "test_package.py")
+"""The rooms of more than half a minute, the longest first."""
 HERE = Path(__file__).resolve().parent
 SAMPLE_LIBRARY = HERE.parents[1] / "sample_blend" / "library"
 RECORDINGS = HERE.parents[2] / "shared" / "data" / "mocap" / "cmu10"
 
 
+def pytest_configure(config):
+    """Let xdist keep the order of rooms; it would begin with those of many tests."""
+    config.option.loadscopereorder = False
+
+
 @pytest.hookimpl(tryfirst=True)  # xdist reads the groups in the same hook
 def pytest_collection_modifyitems(items):
     """The tests of one room run in one process, so that its session fixtures are made once; so do all checks of the
-    source, which share its syntax trees."""
+    source, which share its syntax trees. The longest rooms begin, so that both processes end together."""
     for item in items:
-        room = item.path.relative_to(HERE).parts[0] if item.path.is_relative_to(HERE) else item.path.name
-        room = "source" if item.path.parent == HERE else room
-        item.add_marker(pytest.mark.xdist_group(room))
+        item.add_marker(pytest.mark.xdist_group(find_room(item)))
+    items.sort(key=lambda item: LONGEST.index(room) if (room := find_room(item)) in LONGEST else len(LONGEST))
+
+
+def find_room(item) -> str:
+    """The folder of a test, or its file where that is no room."""
+    if item.path.parent == HERE:
+        return "source"
+    return item.path.relative_to(HERE).parts[0] if item.path.is_relative_to(HERE) else item.path.name
+
+
+gc.disable()  # while tests are collected, of which none is garbage
+
+
+def pytest_collection_finish():
+    """Let the garbage collector pass over what stays to the end: the tests, their code and what they import."""
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_sessionfinish():

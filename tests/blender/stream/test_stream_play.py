@@ -5,6 +5,7 @@ import threading
 import time
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import cache
 from types import SimpleNamespace
 
 import bpy
@@ -20,17 +21,17 @@ OPS = bpy.ops.beyond_mocap
 
 
 @pytest.fixture(scope="module")
-def cache(tmp_path_factory):
+def cache_folder(tmp_path_factory):
     return tmp_path_factory.mktemp("cache")
 
 
 @pytest.fixture
-def playing(room, cache):
+def playing(room, cache_folder):
     """Three players stand, Ann has the ball; 24 frames a second, from frame 5 on."""
     scene = bpy.context.scene
     scene.render.fps = 24
     chosen = bpy.context.preferences.addons[EXTENSION].preferences
-    chosen.cache_folder = str(cache)
+    chosen.cache_folder = str(cache_folder)
     OPS.passes_sample(sample="three")
     scene.beyond_mocap_passes.library_folder, scene.beyond_mocap_passes.start_frame = str(CLIPS), 5
     scene.frame_set(5)
@@ -43,6 +44,7 @@ def told():
     return bpy.context.window_manager.beyond_mocap_streaming
 
 
+@cache
 def kick(core, name="volley_pass"):
     return core("passes.hits").detect_hits(core("files.bvh.bvh").read_bvh(CLIPS / f"{name}.bvh").motion).strongest
 
