@@ -149,25 +149,36 @@ class BeamTransitions:
             Numbers of the candidates (k,); lower bounds (k, B) float32, above the base: what each transition costs
             without repetition, rates and feet; and the same with the change of recording.
         """
-        costs = self.costs
-        lower_bound = costs.cuts.compute_pose_cost(frame, self.left)
-        leave, enter = costs.cuts.compute_cut_ends(self.left, frame)
-        cost = to.cost.astype(np.float32)
-        lower_bound += (enter + cost)[:, None]
-        lower_bound += leave + self.young + self.above
+        cuts, cost = self.costs.cuts, to.cost.astype(np.float32)
+        ends, which = self._distinct_ends
+        leave, enter = cuts.compute_cut_ends(self.left, frame)
+        before = leave + self.young + self.above
+        least_before = np.full(len(ends), np.float32(np.inf))
+        np.minimum.at(least_before, which, before)
+        # a row for each frame at which states end, not for each state, as long as candidates are left out
+        posed = cuts.compute_pose_cost(ends, frame)
+        posed += enter + cost
+        cheapest = (posed + least_before[:, None]).min(axis=0)
         # without a cut nothing but the costs of state and candidate remains
         candidate, state = self._find_uncut_pairs(to)
-        lower_bound[candidate, state] = self.above[state] + cost[candidate]
-        cheapest = lower_bound.ravel().take(np.arange(len(frame)) * len(leave) + np.argmin(lower_bound, axis=1))
+        uncut = self.above[state] + cost[candidate]
+        np.minimum.at(cheapest, candidate, uncut)
+        # others cannot be kept: the known ways to fill the slot cost less
         rows = np.flatnonzero((cheapest <= limit) | (to.piece >= 0))
-        if len(rows) < len(frame):  # others cannot be kept: the known ways to fill the slot cost less
-            lower_bound = lower_bound.take(rows, axis=0)
-        changed = lower_bound + costs.cuts.compute_recording_change(self.left, frame.take(rows)[:, None])
+        other = cuts.compute_recording_change(ends[:, None], frame.take(rows))
+        lower_bound = posed.take(rows, axis=1).take(which, axis=0)
+        lower_bound += before[:, None]
+        changed = lower_bound + other.take(which, axis=0)
         at = np.searchsorted(rows, candidate)
         is_left = np.append(rows, -1)[at] == candidate
         at, state = at[is_left], state[is_left]
-        changed[at, state] = lower_bound[at, state]
-        return rows, lower_bound, changed
+        lower_bound[state, at] = changed[state, at] = uncut[is_left]
+        return rows, np.ascontiguousarray(lower_bound.T), np.ascontiguousarray(changed.T)
+
+    @cached_property
+    def _distinct_ends(self) -> tuple[np.ndarray, np.ndarray]:
+        """The distinct frames (U,) at which states end, and which of them each state's is, (B,): a beam has few."""
+        return np.unique(self.left, return_inverse=True)
 
     def _compute_full_costs(
         self, to: SlotCandidates, frame: np.ndarray, lower_bound: np.ndarray, pairs: np.ndarray,
