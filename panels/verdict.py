@@ -21,8 +21,8 @@ ESSENTIAL = {  # figures that one sees at once -> value from which a take is poo
     "Unusual poses": 50.0, "Second strikes": 2.0, "Ball inside the body": 10.0,
     "Spins not asked for": 3.0, "Snap turns": 10.0, "Pelvis drops": 10.0, "Jolts": 15.0,  # one in 20 s is 3 a minute
 }  # fmt: skip
-# Events from which on a rate makes a take poor: one in 4 s is 15 a minute, but so has one in five takes of 4 s at a rate
-# of 3 a minute (Poisson). One event is no measure of a rate.
+# Events from which on a rate makes a take poor. One in 4 s is 15 a minute, but at a rate of 3 a minute one in five
+# takes of 4 s has one (Poisson): it is no measure of a rate.
 LEAST_EVENTS = 2
 GOOD_SHARE, POOR_SHARE = 0.1, 0.5  # of the targets are missed: at most, more than
 
