@@ -187,7 +187,7 @@ def collect_uncut_windows(values: np.ndarray, speed: np.ndarray) -> tuple[np.nda
 def compute_real_p95(windows: np.ndarray, speed: np.ndarray) -> np.ndarray:
     """Compute the 95th percentile of uncut windows in each speed class.
 
-    A class with fewer than MIN_CLASS_VALUES windows takes the nearest class that has them (runs above 4.5 m/s are rare).
+    A class with fewer than MIN_CLASS_VALUES windows takes the nearest class that has them: runs above 4.5 m/s are rare.
 
     Args:
         windows: (M,) m/s^3.
