@@ -6,7 +6,6 @@ name `beyond_mocap` is blocked, because the same class under two names fails `is
 """
 
 import atexit
-import gc
 import os
 import pathlib
 import shutil
@@ -32,7 +31,6 @@ _repository = pathlib.Path(_profile.name, "extensions", "user_default")
 _repository.mkdir(parents=True)
 (_repository / "beyond_mocap").symlink_to(SOURCE, target_is_directory=True)
 sys.modules["beyond_mocap"] = None
-gc.disable()  # while tests are collected, of which none is garbage
 
 import bpy  # noqa: E402
 
@@ -65,12 +63,6 @@ def pytest_collection_modifyitems(config, items):
     left_out = read_left_out()
     config.hook.pytest_deselected(items=[item for item in items if item.nodeid in left_out])
     items[:] = [item for item in items if item.nodeid not in left_out]
-
-
-def pytest_collection_finish():
-    """Let the garbage collector pass over what stays to the end: the tests, their code and what they import."""
-    gc.freeze()
-    gc.enable()
 
 
 def read_left_out():
