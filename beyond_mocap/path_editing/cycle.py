@@ -116,9 +116,15 @@ def _scale_strides(residuals: Residuals, scale: float) -> Residuals:
 _NEXT_STEP = "switch cycling off, choose a clip that walks or runs for two strides, or shorten the path"
 
 
+def stays_in_place(residuals: Residuals) -> bool:
+    """Return whether a motion does not travel, so that no length of path can be filled with it."""
+    seconds = len(residuals) / residuals.fps
+    return bool(residuals.step.sum() < _LEAST_SPEED * seconds or not (smooth_speed(residuals) > _LEAST_SPEED).any())
+
+
 def _describe_failure(residuals: Residuals) -> str:
     metres, seconds = float(residuals.step.sum()), len(residuals) / residuals.fps
-    if metres < _LEAST_SPEED * seconds or not (smooth_speed(residuals) > _LEAST_SPEED).any():
+    if stays_in_place(residuals):
         return f"the motion stays in place ({metres:.2f} m in {seconds:.1f} s)"
     return f"no part of the motion ({metres:.2f} m, {seconds:.1f} s) can be repeated"
 

@@ -23,7 +23,7 @@ from ..motion.path.terrain import Terrain
 from ..motion.track import smooth_zero_phase_hann
 from ..synthesis.construct.track_following import bend_forward, compute_missing_lean, lean_into_curves
 from . import ground_contact, path_frame, path_time
-from .cycle import cycle_motion
+from .cycle import cycle_motion, stays_in_place
 from .detour import add_detours
 from .foot_planting import LONGEST, Ground, StepScale, plant_feet_on_ground
 from .path_edit_settings import PathEditSettings
@@ -183,7 +183,7 @@ def _build_timing(source: PathEditSource, path: Path, arc: ArcLength,
     end_mode = "stop" if len(transitions) else settings.end
     end = path_time.find_ending(timing.arc, arc.length, residuals.fps, end_mode, path.closed or source.is_still)
     timing = timing.first(end.count)
-    if not (settings.cycle or path.closed or source.is_still):
+    if not (settings.cycle or path.closed or stays_in_place(source.residuals)):
         messages += path_time.report_rest(timing, arc.length, residuals.fps)
     transitions = np.searchsorted(timing.at, transitions - 1e-9)
     return residuals, transitions[transitions < end.count], timing, replace(end, messages=(*messages, *end.messages))

@@ -164,14 +164,14 @@ def _report_lost_touches(scene: bpy.types.Scene, body: bpy.types.Object, origina
     players = scene.beyond_mocap.players
     player = next((one for one in players if body in (one.body, one.character_body, one.rig)), None)
     stored = session.find_take(player.take) if player is not None else None
-    touches = list_touch_times(stored.take) if stored is not None else ()
-    if not len(touches):
+    if stored is None or not len(touches := list_touch_times(stored.take)):
         return ()
     frames = build_scene_clock(scene).to_frame(touches) - first
-    lost = frames[(_measure_offset(original, edited, frames) > _AT_BALL) | (frames > len(edited) - 1)]
+    frames = frames[(frames > -0.5) & (frames < len(original) - 0.5)]  # others were cut off before
+    lost = frames[(_measure_offset(original, edited, frames) > _AT_BALL) | (frames > len(edited) - 0.5)]
     if not len(lost):
         return ()
-    count = f"{len(lost)} of {format_count(len(touches), 'touch', 'touches')}"
+    count = f"{len(lost)} of {format_count(len(frames), 'touch', 'touches')}"
     return (f"the body no longer meets the ball at {count}, first at frame {first + lost[0]:.0f}; the ball stays where "
             "it is: bend the path after the touches, or press Revert and edit the player's track",)
 

@@ -798,3 +798,25 @@ def test_a_bent_path_reports_its_rest_and_touches_that_no_longer_meet_the_ball(s
     points[0].co.y -= 2.0
     bpy.ops.beyond_mocap.update_path()
     assert "no longer meets the ball at 1 of 1 touch, first at frame 73;" in edit.messages
+
+
+def test_a_body_that_stands_and_touches_that_were_cut_off_before_are_no_faults_of_a_path(scene, part, tmp_path,
+                                                                                        library_folder):
+    places = worlds.make_places(tmp_path)
+    worlds.import_tracking(places)
+    scene.beyond_mocap.library_folder = str(library_folder)
+    bpy.ops.beyond_mocap.synthesize(player="player1")
+    bpy.ops.beyond_mocap.accept()
+    body = scene.beyond_mocap.players[0].body
+    channels = part("core.channels")
+    for keys in channels.collect_curves(*channels.find_playing_action(body)).values():
+        for key in reversed(keys.keyframe_points):
+            if key.co.x > 40.0:  # the kick is at frame 73
+                keys.keyframe_points.remove(key)
+    for one in (body, walker("standing_1")):
+        choose(one)
+        bpy.ops.beyond_mocap.edit_path()
+        one.beyond_mocap_ride.curve.data.splines[0].bezier_points[0].co.y -= 2.0
+        bpy.ops.beyond_mocap.update_path()
+        assert "ball" not in one.beyond_mocap_ride.messages
+    assert "before the end of the path" not in one.beyond_mocap_ride.messages

@@ -36,6 +36,7 @@ def place(tmp_path_factory):
     folder = tmp_path_factory.mktemp("ride")
     bvh.write_bvh(folder / "walk.bvh", build_gait(1.4, 4.0, 60.0))
     bvh.write_bvh(folder / "stand.bvh", build_gait(0.0, 2.0, 30.0))
+    bvh.write_bvh(folder / "shuffle.bvh", build_gait(0.1, 4.0, 30.0))
     bvh.write_bvh(folder / "one.bvh", build_gait(1.4, 1.0, 30.0).frames(0, 1))
     (folder / "stick.bvh").write_text(STICK)
     (folder / "bend.csv").write_text(arc(3.0, 180.0))
@@ -105,6 +106,7 @@ def test_a_path_longer_than_the_motion_is_reported(run):
     assert any(re.search(r"the motion ends \d\.\d m before the end of the path: shorten", line) for line in run()[2])
     for more, curve in ((["--cycle"], "bend"), ([], "short"), (["--no-arc-length"], "bend")):
         assert not any("before the end of the path" in line for line in run(*more, curve=curve)[2]), more
+    assert not any("Cycle" in line for line in run(recording="shuffle")[2])  # it would repeat nothing
 
 
 def test_the_report_has_one_height_of_feet_over_the_ground_below_them(run, tmp_path):
