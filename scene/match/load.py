@@ -155,16 +155,19 @@ def _describe_quality(folder: str, characters: list[Character]) -> str:
     from ...beyond_mocap.evaluation.report import judge_figures
     from ...beyond_mocap.match.report.results import read_match_results
 
-    shown, met = {person.id for person in characters}, {}
+    shown, found = {person.id for person in characters}, []
     for player in read_match_results(Path(folder)).players:
-        is_met = [row.status == "met" for row in judge_figures(player.report) if row.status]
-        if player.id in shown and is_met:
-            met[player.display_name] = is_met
-    if not met:
+        met = [row.status == "met" for row in judge_figures(player.report) if row.status]
+        if player.id in shown and met:
+            found.append((np.mean(met), player.display_name, met))
+    if not found:
         return ""
-    share, worst = np.mean(sum(met.values(), [])), min(met, key=lambda name: np.mean(met[name]))
-    text = f"{100.0 * share:.0f} % of the targets met by {format_count(len(met), 'player')}"
-    return f"{text}, fewest by {worst} ({100.0 * np.mean(met[worst]):.0f} %)" if len(met) > 1 else text
+    share, (least, worst, _) = np.mean(sum((met for *_, met in found), [])), min(found)
+    count = format_count(len(found), "player")
+    if len(found) < len(characters):
+        count = f"{len(found)} of {format_count(len(characters), 'player')}, the others have no figures"
+    text = f"{100.0 * share:.0f} % of the targets met by {count}"
+    return f"{text}; fewest by {worst} ({100.0 * least:.0f} %)" if len(found) > 1 else text
 
 
 def _find_sport(state: dict) -> str:

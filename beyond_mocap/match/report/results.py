@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ...base.errors import InputError
-from ...evaluation.report import check_depth
+from ...evaluation.report import check_depth, judge_figures
 
 DONE_STATUS = "done"
 FIGURES = ("root_error_m", "skate_cm_s", "overlap_m", "ball_m")
@@ -222,6 +222,11 @@ def _read_report(path: Path) -> Mapping:
     found = _read_object(path)
     if not isinstance(found.get("warnings", []), list):
         raise InputError(path, "cannot be read: its warnings are no list", "a player's report", "run the match again")
+    try:
+        list(judge_figures(found))
+    except (AttributeError, OverflowError, TypeError, ValueError):
+        raise InputError(path, "cannot be read: figures in another form", "a player's report",
+                         "run the match again") from None
     return found
 
 

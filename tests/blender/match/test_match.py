@@ -211,7 +211,33 @@ def test_a_match_made_while_another_scene_is_shown_is_not_lost(place, made):
     bpy.context.window.scene = scene
     assert bpy.ops.beyond_mocap.show_match() == {"FINISHED"} and room("match_objects").find_armatures(scene)
     count = len(seen[1].characters)
-    assert re.match(rf"\d+ % of the targets met by {count} players, fewest by .* \(\d+ %\)$", match.quality)
+    assert re.match(rf"\d+ % of the targets met by {count} players; fewest by .* \(\d+ %\)$", match.quality)
+
+
+def test_a_match_with_damaged_reports_is_shown_with_what_is_known(place, made, tmp_path):
+    """Two players of one name are two, and nothing is said where no player has figures."""
+    match = a_match(place, "")
+    match.start, match.end = 2.0, 8.0
+    folder = shutil.copytree(made, tmp_path / "damaged")
+    load = room("load")
+    wanted = room("request").build_display_request(bpy.context.scene, str(folder))
+
+    def read_quality():
+        return load.load_section(wanted, None, lambda done, text: None, lambda: False)[1].quality
+
+    state = json.loads((folder / "match.json").read_text())
+    for player in state["players"]:
+        player["name"], player["number"] = "Silva", 7
+    (folder / "match.json").write_text(json.dumps(state))
+    reports = sorted(folder.glob("*.report.json"))
+    first = json.loads(reports[0].read_text())
+    assert "by 2 players; fewest by 7 Silva" in read_quality()
+    for damage in ({"fps": "fast"}, {"unknown": [1]}, {"notes": 3}):
+        reports[0].write_text(json.dumps({**first, **damage}))
+        assert read_quality().endswith("by 1 of 2 players, the others have no figures")
+    for path in reports:
+        path.unlink()
+    assert read_quality() == ""
 
 
 def test_an_end_before_the_start_is_told_before_anything_is_made(place, tmp_path):
