@@ -336,8 +336,13 @@ class TakeOperator(BaseOperator):
 
 
 def _is_unchanged(player, entry: "queue.QueueEntry", result) -> bool:
-    """Return whether an update had the inputs of the take that the player has."""
-    return entry.mode.kind == "update" and json.loads(player.result.made_of or "{}") == result.made_of
+    """Return whether an update had the inputs of the take that the player has and a body shows: a quick one has other
+    frames, and no figures.
+    """
+    is_quick = "\tmet" not in player.quality and "\tmissed" not in player.quality
+    if entry.mode.kind != "update" or is_quick or freshness.describe_body_problem(player.id_data, player):
+        return False
+    return json.loads(player.result.made_of or "{}") == result.made_of
 
 
 def _name_topic(player: str) -> str:

@@ -173,12 +173,12 @@ def check_player(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> tuple[lis
     except (BeyondMocapError, OSError) as error:
         lines.append(str(error))
     if player.result.state != "NONE":
-        problem = _describe_body_problem(scene, player)
+        problem = describe_body_problem(scene, player)
         lines += [problem] if problem else []
     return lines, _describe_notes(player), operator if lines else ""
 
 
-def _describe_body_problem(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> str:
+def describe_body_problem(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> str:
     """Describe what is wrong with the body that shows a result."""
     body, result = player.body, session.find_take(player.take)
     if body is None or body.name not in scene.objects:

@@ -107,6 +107,24 @@ def test_after_the_file_was_opened_again_update_makes_the_same_bits(renew, made,
     assert renew().lines == "" and player.result.hand_keys == 1
 
 
+def test_nothing_has_changed_is_said_only_where_the_take_is_the_same(made, ready, capfd):  # noqa: F811
+    def press(**arguments):
+        capfd.readouterr()
+        (bpy.ops.beyond_mocap.update_live if arguments else bpy.ops.beyond_mocap.update)(**arguments)
+        return capfd.readouterr().out
+
+    assert "Nothing has changed" in press()
+    bpy.data.objects.remove(made.body)
+    assert "Generated" in press()  # another body
+    bpy.ops.beyond_mocap.discard()
+    assert "Generated" in press()  # shown again
+    for kind in ("whole", ""):
+        ready.alpha += 0.1
+        assert "Generated" in press(player=made.name, kind="quick")
+        assert "Generated" in press(**({"player": made.name, "kind": kind} if kind else {}))  # the full take
+    assert "Nothing has changed" in press()
+
+
 def test_a_stretch_is_another_solution_and_pressed_again_a_third(made, session):  # noqa: F811
     first = session.find_take(made.take).take
     bpy.ops.beyond_mocap.resynthesize_stretch(player=made.name, start=3.0, end=5.0)
