@@ -15,9 +15,9 @@ TASKS = {  # feature -> the task below whose switch its notices are shown; a ste
     "rigs": "",
 }
 POPUP_WIDTH, POPUP_LETTERS = 21, 70  # the pop-up's width in units of the interface, and letters in a line of it
+SWITCH_HEIGHT = 60  # pixels of the switch above a task's notices, at a scale of 1
 
-
-_drawn: set[int] = set()  # numbers of the notices that a panel has drawn
+_drawn: set[int] = set()  # numbers of the notices that a panel has drawn where they can be seen
 
 
 class BEYOND_MOCAP_PT_notices(bpy.types.Panel):
@@ -44,17 +44,19 @@ class BEYOND_MOCAP_PT_notices(bpy.types.Panel):
                 draw_notice(self.layout.column(), row, lambda text: textwrap.wrap(text, POPUP_LETTERS))
 
 
-def draw_notices(layout, context, rooms: tuple[str, ...]) -> None:
+def draw_notices(layout, context, rooms: tuple[str, ...], is_in_view: bool = True) -> None:
     """Draw the notices of some features in boxes; nothing where there are none.
 
     Args:
         layout: the layout to draw into.
         context: Blender's context.
         rooms: names of operators' modules.
+        is_in_view: whether they can be seen: Blender draws what is scrolled out of view too.
     """
     for row in context.window_manager.beyond_mocap_notices.rows:
         if row.room in rooms and row.scene == str(context.scene.session_uid):
-            _drawn.add(row.number)
+            if is_in_view:
+                _drawn.add(row.number)
             draw_notice(layout.box().column(), row, wrap_text)
 
 
@@ -68,7 +70,14 @@ def draw_task_notices(layout, context) -> None:
     task = context.scene.beyond_mocap.task
     rows = context.window_manager.beyond_mocap_notices.rows
     rooms = {row.room for row in rows if TASKS.get(row.room, task) == task}
-    draw_notices(layout, context, tuple(rooms))
+    if rooms:
+        draw_notices(layout, context, tuple(rooms), is_in_view=_is_top_in_view(context))
+
+
+def _is_top_in_view(context) -> bool:
+    """Return whether the tab is not scrolled further down than the switch is high."""
+    _, top = context.region.view2d.region_to_view(0, context.region.height)
+    return top > -SWITCH_HEIGHT * context.preferences.system.ui_scale
 
 
 def draw_notice(column, row, wrap) -> None:

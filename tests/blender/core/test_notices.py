@@ -2,6 +2,7 @@
 
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import pytest
@@ -89,6 +90,19 @@ def test_a_panel_that_shows_a_notice_leaves_nothing_to_the_popup(lacking, monkey
     assert panels.BEYOND_MOCAP_PT_notices.poll(bpy.context)
     panels.draw_notices(FakeLayout(), bpy.context, ("synthesis",))
     assert not panels.BEYOND_MOCAP_PT_notices.poll(bpy.context)
+
+
+def test_a_notice_that_is_scrolled_out_of_view_is_left_to_the_popup(lacking, monkeypatch):
+    import importlib
+
+    panels, context = importlib.import_module(f"{EXTENSION}.panels.notices"), create_context(monkeypatch)
+    notice, context.region.height = list_notices()[-1], 900
+    notice.room, bpy.context.scene.beyond_mocap.task = "match", "MATCH"  # at the top of the tab
+    bpy.context.window_manager.beyond_mocap_notices.shown = notice.number
+    for top, is_left in ((-300.0, True), (0.0, False)):
+        context.region.view2d = SimpleNamespace(region_to_view=lambda x, y, top=top: (x, top + y - 900))
+        panels.draw_task_notices(FakeLayout(), context)
+        assert panels.BEYOND_MOCAP_PT_notices.poll(bpy.context) is is_left
 
 
 def test_use_nearest_labels_synthesizes_again(lacking):
