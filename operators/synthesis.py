@@ -32,15 +32,15 @@ class BEYOND_MOCAP_OT_update(TakeOperator, bpy.types.Operator):
              lambda context: any(player.use and player.take for player in context.scene.beyond_mocap.players))
 
     def list_requests(self, context):
-        """List the players that are out of date; without any, all selected ones.
+        """List the players that are out of date, or whose take is not in this session; without any, all selected ones.
 
         Drawn tracks are read again in any case, since `look` does not play what has to be played.
         """
         found = super().list_requests(context)
         if len(found) == 1:
             return found
-        changed = [(player, how) for player, how in found
-                   if player.drawn_track is not None or freshness.check_player(context.scene, player)[0]]
+        changed = [(player, how) for player, how in found if player.drawn_track is not None or session.find_take(
+            player.take) is None or freshness.check_player(context.scene, player)[0]]
         return changed or found
 
 

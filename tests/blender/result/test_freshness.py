@@ -107,6 +107,14 @@ def test_after_the_file_was_opened_again_update_makes_the_same_bits(renew, made,
     assert renew().lines == "" and player.result.hand_keys == 1
 
 
+def test_update_brings_back_all_takes_of_a_file_and_not_only_what_is_out_of_date(ready, session, scene):  # noqa: F811
+    bpy.ops.beyond_mocap.synthesize()
+    session.clear_session()  # as when the file is opened again
+    scene("timeline.strips").add_moment(bpy.context, ready.players[0], 9.0, ("kick",))
+    bpy.ops.beyond_mocap.update()
+    assert len(ready.players) == 2 and all(session.find_take(player.take) for player in ready.players)
+
+
 def test_nothing_has_changed_is_said_only_where_the_take_is_the_same(made, ready, capfd):  # noqa: F811
     def press(**arguments):
         capfd.readouterr()
