@@ -74,13 +74,13 @@ def read_clips(recordings: Recordings, arrays: Path | None, notes: list[str], re
     from .repair import describe_repairs
 
     levelled, repaired = (MotionWriter(arrays and arrays / f"{name}.npy") for name in ("levelled", "repaired"))
-    read = _level_recordings(recordings, levelled, notes, report, cancelled)
-    rows = _read_rows(recordings, read.motions, notes)
+    motions, read = _level_recordings(recordings, levelled, notes, report, cancelled)
+    rows = _read_rows(recordings, motions, notes)
     is_proposed = not any(rows)
-    repairs, contacts = _repair_clips(recordings, read.motions, read.drifts, repaired, notes=notes, report=report,
+    repairs, contacts = _repair_clips(recordings, motions, read.drifts, repaired, notes=notes, report=report,
                                       cancelled=cancelled)
     levelled.discard()
-    motions, t_poses = repaired.finish(), read.t_poses
+    motions, t_poses = repaired.finish(), read.t_poses  # a file that is still mapped keeps its place on the disk
     if is_proposed:
         rows = _propose_rows(recordings, motions, t_poses.frames, report, cancelled)
     balls = [None if ball is None else ball.place(motion) for ball, motion in zip(read.balls, motions)]
@@ -99,17 +99,15 @@ def read_clips(recordings: Recordings, arrays: Path | None, notes: list[str], re
 
 @dataclass(frozen=True, kw_only=True)
 class _Levelled:
-    """Recordings without pops and drift, on their own skeletons.
+    """What is known of recordings when they are read.
 
     Attributes:
-        motions: theirs.
         pop_counts: number of pops that were removed from each.
         drifts: metres by which the floor of each rose or sank.
         balls: theirs; None for recordings without one.
         t_poses: theirs.
     """
 
-    motions: Sequence[Motion]
     pop_counts: list[int]
     drifts: list[float]
     balls: list[BodyBall | None]
@@ -117,9 +115,11 @@ class _Levelled:
 
 
 def _level_recordings(recordings: Recordings, levelled: MotionWriter, notes: list[str], report: Progress,
-                      cancelled) -> _Levelled:
+                      cancelled) -> tuple[Sequence[Motion], _Levelled]:
     """Read all recordings into `levelled`, without their T-poses; notes get the readers' lines.
 
+    Returns:
+        Their motions without pops and drift, on their own skeletons, and what is known of them.
     Raises:
         InputError: if a recording has no legs, or none shows more than a T-pose.
     """
@@ -134,7 +134,7 @@ def _level_recordings(recordings: Recordings, levelled: MotionWriter, notes: lis
     t_poses.check(recordings.folder)
     notes += _collect_unit_notes(unit_notes)
     pop_counts, drifts, balls = (list(column) for column in zip(*changes))
-    return _Levelled(motions=levelled.finish(), pop_counts=pop_counts, drifts=drifts, balls=balls, t_poses=t_poses)
+    return levelled.finish(), _Levelled(pop_counts=pop_counts, drifts=drifts, balls=balls, t_poses=t_poses)
 
 
 def _write_clips(originals: Iterable[Clip], shown: Iterable[Motion], complete: MotionWriter, notes: list[str],

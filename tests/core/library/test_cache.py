@@ -15,7 +15,7 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files import motion_file
-from beyond_mocap.library import build, cache, synthetic_clips
+from beyond_mocap.library import build, cache, read_clips, synthetic_clips
 from beyond_mocap.library import library as library_module
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.features import list_frame_arrays
@@ -216,6 +216,24 @@ def test_a_cache_of_another_form_is_not_used(folder, change):
     library, worked = built(folder)
     assert worked and len(library.clips) == 4
     assert not built(folder)[1]
+
+
+def test_files_of_a_build_give_up_their_place_when_they_are_read(folder, tmp_path, monkeypatch):
+    """A file that is mapped keeps its place on the disk although it is removed."""
+    counts, write = [], read_clips._write_clips
+
+    def count_mapped():
+        gc.collect()
+        return sum(isinstance(one, motion_file.MappedMotions) for one in gc.get_objects())
+
+    def write_clips(*arguments):
+        counts.append(count_mapped())
+        return write(*arguments)
+
+    monkeypatch.setattr(read_clips, "_write_clips", write_clips)
+    before = count_mapped()
+    build_library(folder, cache_dir=tmp_path / "cache")
+    assert counts == [before + 1]  # the repaired motions
 
 
 def test_a_cache_of_an_earlier_version_is_told_and_replaced(folder):
