@@ -9,12 +9,14 @@ from beyond_mocap.synthesis.search.path_costs import PathCosts
 STATES, FRAMES = 40, 500
 
 
-@pytest.fixture(scope="module")
-def ways(library, order):
-    """Ways on from random states, and random frames that they may come to; some pairs go on without a cut."""
+@pytest.fixture(scope="module", params=[STATES, 7, 1])
+def ways(library, order, request):
+    """Ways on from random states that end at so many frames, and random frames that they may come to; some pairs go on
+    without a cut.
+    """
     costs, random = PathCosts(library, order()), np.random.default_rng(3)
     count, clips = len(library.frames), library.frames.clip
-    end = np.sort(random.integers(0, count, STATES)).astype(float)
+    end = np.sort(np.resize(random.integers(0, count, request.param), STATES)).astype(float)
     start = np.concatenate([random.integers(0, count, FRAMES - 6), end[:6]]).astype(float)
     piece = np.where(np.arange(FRAMES) % 50 == 7, 3, -1)
     rates = random.choice([0.875, 1.0, 1.125], (2, FRAMES))
