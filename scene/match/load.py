@@ -153,11 +153,11 @@ def _read_state(folder: str) -> dict:
 def _describe_quality(folder: str, characters: list[Character]) -> str:
     """Describe how many of their targets the characters meet, by their reports of the whole match."""
     from ...beyond_mocap.evaluation.report import judge_figures
-    from ...beyond_mocap.match.report.results import read_match_results
+    from ...beyond_mocap.match.report.results import read_match_results, select_figures
 
     shown, found = {person.id for person in characters}, []
     for player in read_match_results(Path(folder)).players:
-        met = [row.status == "met" for row in judge_figures(player.report) if row.status]
+        met = [row.status == "met" for row in judge_figures(select_figures(player.report)) if row.status]
         if player.id in shown and met:
             found.append((np.mean(met), player.display_name, met))
     if not found:

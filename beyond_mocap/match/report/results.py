@@ -141,6 +141,11 @@ def read_match_results(folder: Path) -> MatchResults:
     )  # fmt: skip
 
 
+def select_figures(report: Mapping) -> dict:
+    """Select what a report has of a whole motion, without the thousands of values of its seconds."""
+    return {key: value for key, value in report.items() if key != "per_second"}
+
+
 def _parse_teams(rows_found) -> dict[str, TeamResult]:
     """Parse the teams by their ground, else by name; two teams of the same name get their ground added."""
     rows = [row for row in rows_found if isinstance(row, Mapping)] if isinstance(rows_found, list) else []
@@ -223,7 +228,7 @@ def _read_report(path: Path) -> Mapping:
     if not isinstance(found.get("warnings", []), list):
         raise InputError(path, "cannot be read: its warnings are no list", "a player's report", "run the match again")
     try:
-        list(judge_figures(found))
+        list(judge_figures(select_figures(found)))
     except (AttributeError, OverflowError, TypeError, ValueError):
         raise InputError(path, "cannot be read: figures in another form", "a player's report",
                          "run the match again") from None

@@ -19,7 +19,7 @@ from ...evaluation.html_page import (
 from ...evaluation.report import flatten_report
 from ...evaluation.titles import Title
 from ...synthesis.quality.targets import find_target
-from .results import PlayerResult, select_own_warnings, to_number
+from .results import PlayerResult, select_figures, select_own_warnings, to_number
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ def _build_player_row(player: PlayerResult, strip: Html, anchors: Mapping[str, s
     if not player.report:
         why = build_element("td", _describe_status(player), colspan=len(COLUMNS) + 1, class_="missed")
         return build_row(build_element("td", link, class_="name"), why, strip)
-    found = flatten_report({key: value for key, value in player.report.items() if key != "per_second"})
+    found = flatten_report(select_figures(player.report))
     cells = [_build_cell(column, _find_value(player, column.figure, found), player, found) for column in COLUMNS]
     note = () if player.is_finished else (build_element("br"), build_element("span", _describe_status(player),
                                                                              class_="missed"))
@@ -148,7 +148,7 @@ def build_group_table(title: str, players: Sequence[PlayerResult], anchors: Mapp
         return Html()
     rows = []
     for player in reported:
-        found = flatten_report({key: value for key, value in player.report.items() if key != "per_second"})
+        found = flatten_report(select_figures(player.report))
         cells = [_build_cell(column, _find_value(player, column.figure, found), player, found) for column in columns]
         rows.append(build_row(build_element("td", build_player_link(player, anchors), class_="name"), *cells))
     rows += [build_row(name, *cells, class_="sum") for name, cells in _summarize_columns(columns, reported)]

@@ -139,6 +139,15 @@ def test_failed_and_unreadable_players_are_marked_and_the_rest_is_told(tmp_path)
     assert "file-d.report.json is missing" in text
 
 
+@pytest.mark.parametrize("damage", [{"fps": "fast"}, {"skate": {"gmd_ratio": 0.3, "source_gmd_ratio": "x"}},
+                                    {"notes": 3}])
+def test_figures_of_another_form_are_those_of_one_player(tmp_path, damage):
+    folder = written(tmp_path, {"a": report(), "b": {**report(), **damage}})
+    found = read_match_results(folder).players
+    assert [one.is_finished for one in found] == [True, False] and "figures in another form" in found[1].reason
+    assert "1 of 2 players finished" in build_match_page(folder)
+
+
 def test_what_all_reports_say_is_told_once_and_not_counted(tmp_path):
     reports = {name: report() for name in ("a", "b", "c")}
     for name, one in reports.items():
