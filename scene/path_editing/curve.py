@@ -30,6 +30,7 @@ _COUNTS = (6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 60, 80)
 _FIT_TOLERANCE = 0.03  # metres between a fitted curve and the path, at most
 _MOST_SPACING = 5.0  # metres between two points, at most, so that there is always one to drag
 _LEAST_SPACING, _MOST_POINTS = 0.08, 240  # metres between two Bezier points, at least; number of points, at most
+_SWAY, _MOST_EXTENSIONS = 0.1, 8  # metres that the end of a path sways at most; times that a curve is extended
 _SPARE = 0.002  # metres by which a fitted curve is longer than the path, so that the motion does not end early
 _grounds: dict[int, tuple[bytes, object]] = {}  # by session_uid of the mesh object: digest, `Terrain`
 
@@ -389,14 +390,15 @@ def _extend_curve(scene: bpy.types.Scene, created: bpy.types.Object, path: Path)
     if spline.use_cyclic_u:
         return
     units, length = units_per_metre(scene), ArcLength(path).length + _SPARE
-    for _ in range(3):
-        line = read_curve(scene, created).sample_line()
+    line, last = read_curve(scene, created).sample_line(), list_points(spline)[-1]
+    # The last tangent would not do: a body that sways back where it stops has it against the way that it came.
+    before = np.flatnonzero(np.linalg.norm(line - line[-1], axis=1) > _SWAY)
+    ahead = unit_vectors(line[-1] - line[before[-1] if len(before) else 0])
+    for _ in range(_MOST_EXTENSIONS):
         lacks = length - ArcLength(read_curve(scene, created).to_path()).length
-        ahead = line[-1] - line[-2]
-        if lacks <= 0.0 or np.linalg.norm(ahead) < 1e-9:
+        if lacks <= 0.5 * _SPARE:
             return
-        by = Vector(ahead / np.linalg.norm(ahead) * lacks * units)
-        last = list_points(spline)[-1]
+        by = Vector(ahead * (lacks * units))
         if spline.type == "BEZIER":
             last.handle_left, last.handle_right = last.handle_left + by, last.handle_right + by
             last.co = last.co + by

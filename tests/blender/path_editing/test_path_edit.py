@@ -820,3 +820,12 @@ def test_a_body_that_stands_and_touches_that_were_cut_off_before_are_no_faults_o
         bpy.ops.beyond_mocap.update_path()
         assert "ball" not in one.beyond_mocap_ride.messages
     assert "before the end of the path" not in one.beyond_mocap_ride.messages
+
+
+@pytest.mark.parametrize(("name", "kind"),
+                         [("walking_back", "BEZIER"), ("getting_up", "BEZIER"), ("throw_in", "NURBS")])
+def test_a_body_that_sways_back_where_it_stops_is_not_cut_off_on_its_own_path(scene, name, kind):
+    body = walker(name)
+    choose(body)
+    bpy.ops.beyond_mocap.edit_path(kind=kind)
+    assert body.beyond_mocap_ride.messages == ""
