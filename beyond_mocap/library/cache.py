@@ -41,7 +41,7 @@ from .folder.conversions import read_stamp
 from .folder.recordings import CACHE_FOLDER
 
 # raised whenever what is computed or stored changes, so that old caches are not used
-VERSION = 48
+VERSION = 49
 MOTIONS = "motions.npy"
 """Name of the file with the motions of all clips (`files.motion_file`)."""
 CLASSIFIER_FILE = "learned_words.npz"

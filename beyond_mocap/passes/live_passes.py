@@ -206,7 +206,7 @@ def build_answer(library: Library, rally: Rally, hit: HitMotion, target: str, bo
     """Build the pass with which the holder answers a hit of the user: the most similar motion of the library (eq. 2).
 
     The kind of the pass is that of the library's motion. It is planned from where the players and the ball come to
-    rest.
+    rest; the receiver goes back to their place in the scene.
 
     Args:
         library: the library.
@@ -229,9 +229,9 @@ def build_answer(library: Library, rally: Rally, hit: HitMotion, target: str, bo
                example=Example("", hit=played))
     scene = replace(
         rally.scene, passes=(one,), repeat=1, missed=0.0, dropped=0.0, lead_in=0.0, lead_out=_TAIL, serve=GROUND,
-        players=tuple(
-            replace(player, place=stances[player.name].place, facing=stances[player.name].facing, height=0.0)
-            for player in rally.scene.players
+        players=tuple(  # the receiver goes back to their place: each strike carries its player on, towards the others
+            replace(player, place=player.place if player.name == target else stances[player.name].place,
+                    facing=stances[player.name].facing, height=0.0) for player in rally.scene.players
         ),
     )
     plan = _plan_pass(library, scene, stances[rally.holder], ball_place=ball_place, progress=progress,

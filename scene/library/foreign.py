@@ -195,13 +195,20 @@ def _find_largest_rig(path: Path, scene: bpy.types.Scene) -> bpy.types.Object:
 
 def _keep_balls(scene: bpy.types.Scene, rig: bpy.types.Object) -> list[bpy.types.Object]:
     """Remove the objects that carry neither the armature nor a ball, so that frames are quick; returns the balls."""
-    balls = [item for item in scene.objects if is_ball_name(item.name) and item.type != "ARMATURE"
+    balls = [item for item in scene.objects if _is_named_ball(item) and item.type != "ARMATURE"
              and not any(one.type == "ARMATURE" for one in item.modifiers)]
     balls = [item for item in balls if not set(_list_carriers(item)[1:]) & set(balls)]
     carriers = {one.name for item in (rig, *balls) for one in _list_carriers(item)}
     for other in [item for item in scene.objects if item.name not in carriers]:
         bpy.data.objects.remove(other)
     return balls
+
+
+def _is_named_ball(item: bpy.types.Object) -> bool:
+    """Whether an object is named as a ball, or in USD the transform that moves it: Blender then names it by its mesh.
+    """
+    movers = [one.object_path.rpartition("/")[2] for one in item.constraints if one.type == "TRANSFORM_CACHE"]
+    return any(map(is_ball_name, (item.name, *movers)))
 
 
 def _list_carriers(item: bpy.types.Object | None) -> list[bpy.types.Object]:

@@ -19,7 +19,7 @@ from ...files.clip_file import FOREIGN
 from .recordings import check_files, list_own_recordings
 
 _CONVERT = "press Build Library in Blender, or run batch.py -- library in it"
-_TABLE, _FORM = "converted.json", 1  # raised when conversions hold more: Blender then converts again
+_TABLE, _FORM = "converted.json", 2  # raised when conversions hold more: Blender then converts again
 
 
 def find_readable_clips(folder: str | Path, place: str | Path,

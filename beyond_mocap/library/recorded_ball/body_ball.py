@@ -13,6 +13,7 @@ import numpy as np
 
 from ...base.time_series import interpolate_columns
 from ...files.bvh.bvh import BvhClip
+from ...files.bvh.bvh_write import BvhForm
 from ...files.tables import read_ball
 from ...motion.humanoid import measure_leg_length
 from ...motion.motion import Motion
@@ -65,6 +66,8 @@ def read_recorded_ball(path: Path, file: Path, source: BvhClip) -> tuple[BodyBal
     table, motion = find_ball_table(path, file), source.motion
     name = path.name if table is None else table.name
     ball = source.ball if table is None else _sample_table(table, motion)
+    if table is not None and table.parent != path.parent:  # a conversion's, whose ball is in the unit of its body
+        ball = ball * (source.form.unit / BvhForm.unit)
     if ball is None:
         return None, ()
     known = np.isfinite(ball).all(axis=1)

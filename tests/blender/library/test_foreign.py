@@ -215,7 +215,7 @@ def test_an_animated_ball_beside_the_armature_comes_back(core, rooms, tmp_path, 
     planted = build_kicked_ball(synthetic_motion.build_motion(core, 61), 30)
 
     def lie(rig):
-        add_ball(scene, planted, kind="MESH" if ending != ".usdc" else "EMPTY")
+        add_ball(scene, planted).data.name = "Icosphere"  # as Blender names a new mesh
         add_ball(scene, planted + 8.0, "Ball.001")
 
     motion = exported(core, rooms, path, 30, lie)

@@ -11,6 +11,7 @@ from beyond_mocap.files.bvh import bvh
 from beyond_mocap.files.tables import write_ball
 from beyond_mocap.library.build import build_library
 from beyond_mocap.library.recorded_ball import contact_keys
+from beyond_mocap.library.recorded_ball.body_ball import read_recorded_ball
 from beyond_mocap.motion.ball_names import is_ball_name
 from beyond_mocap.motion.motion import Motion, compute_pose, sample_frames
 from beyond_mocap.motion.track import BALL_RADIUS
@@ -128,6 +129,21 @@ def test_a_ball_on_another_body_stays_at_its_foot(folder, kick):
     assert clip.ball[:, 2].min() == pytest.approx(BALL_RADIUS, abs=0.02)
     away = clip.ball[round(frame)] - clip.motion.root_positions[round(frame)]
     assert np.abs(away - (ball - kick.motion.root_positions)[round(frame)])[:2].max() < 0.05
+
+
+def test_a_ball_of_a_conversion_is_in_the_unit_of_its_body(tmp_path, kick):
+    """A file in centimetres that was taken for metres: its body is a hundred times as large, and so is its ball."""
+    ball, _ = plant_ball(kick)
+    giant = Motion(kick.motion.skeleton.scale(100.0), kick.motion.root_positions * 100.0, kick.motion.rotations, 60.0)
+    converted = tmp_path / "converted" / "kick.fbx.bvh"
+    converted.parent.mkdir()
+    bvh.write_bvh(converted, giant)
+    write_table(converted.parent / "kick.fbx.ball.csv", ball * 100.0)
+    source = bvh.read_bvh(converted)
+    found, notes = read_recorded_ball(tmp_path / "kick.fbx", converted, source)
+    away, size = found.place(source.motion) - source.motion.root_positions, source.form.unit / 1e-4  # it is estimated
+    assert notes == () and size == pytest.approx(1.0, abs=0.05)
+    assert np.abs(away - size * (ball - kick.motion.root_positions)).max() < 0.01
 
 
 def test_bad_balls_are_named_in_a_line(folder, kick):

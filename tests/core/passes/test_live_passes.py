@@ -83,6 +83,16 @@ def test_nothing_jumps(passed):
             assert np.linalg.norm(np.diff(places, axis=0), axis=2).max() * played.motion.fps < 14.0
 
 
+def test_players_of_a_long_rally_keep_their_places(library, rally):
+    """Each strike carries its player on by most of a metre: without a way back they would meet."""
+    for number in range(8):
+        receiver = ("Ben", "Ann")[number % 2]
+        rally = rally.add_pass(build_answer(library, rally, hit_of("volley_pass"), receiver), rally.ready_time + 0.3)
+        stance = rally.stances[receiver]
+        assert np.linalg.norm(np.subtract(stance.place, rally.scene.find_player(receiver).place)) < 0.8
+    assert (rally.passes, rally.holder) == (8, "Ann")
+
+
 def test_what_was_done_goes_over_into_the_pass(rally, passed):
     first, after, _, _ = passed
     old, new = rally.players["Ann"].motion, after.players["Ann"].motion
