@@ -13,6 +13,7 @@ from pathlib import Path
 
 from ..base.errors import InputError, UserCancelledError
 from ..base.settings.options import parse_path
+from ..files.clip_file import FOREIGN
 from ..files.file_names import identify_file
 
 Writer = Callable[..., Sequence[str] | None]
@@ -162,15 +163,16 @@ def write_bvh(take, out: Path, above: Sequence = ()) -> None:
 
 
 def check_outputs(*paths: Path | None, reserved: tuple[Path | None, ...] = (), library: Path | None = None,
-                  labels: Path | None = None) -> None:
+                  labels: Path | None = None, motion: Path | None = None) -> None:
     """Check before the work that every output can be written and that no two paths are the same file.
 
     Args:
         paths: the output files; None is skipped.
         reserved: files that must not be overwritten, such as the inputs; None is skipped.
         library: a folder whose recordings, labels and balls must not be overwritten, and where no output may have the
-            name of labels or a ball that do not exist yet; None for none.
+            name of a recording, labels or a ball that do not exist yet; None for none.
         labels: one of the paths, a table of labels, which may become a new one of the library; None for none.
+        motion: one of the paths, which may become a recording of the library; None for none.
     Raises:
         InputError: for the first path that fails.
     """
@@ -197,6 +199,14 @@ def check_outputs(*paths: Path | None, reserved: tuple[Path | None, ...] = (), l
         if not path.exists() and os.path.normcase(resolved) in recorded:
             raise InputError(path, f"would be read as labels or as a ball of the library {library}", "another file",
                              "choose another name")
+        if library is not None and path is not motion and _is_named_like_recording(resolved, library):
+            raise InputError(path, f"would be read as a recording of the library {library}", "another file",
+                             "choose another name")
+
+
+def _is_named_like_recording(path: Path, library: Path) -> bool:
+    """Return whether a file below a library would be read as a recording by its name; an .npz is by its content."""
+    return path.suffix.lower() in (".bvh", *FOREIGN) and path.is_relative_to(library.resolve())
 
 
 def _identify_library_files(library: Path, labels: Path | None) -> set[tuple[int, int] | str]:

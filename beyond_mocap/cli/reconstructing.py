@@ -77,7 +77,7 @@ def _reconstruct_trial(options, reporter: ProgressReporter, writers: Mapping[str
     started = time.perf_counter()
     inputs = (options.trial, options.static, options.model)
     check_outputs(options.out, options.report, options.save_model, options.ball_csv, reserved=inputs,
-                  library=options.add_to)
+                  library=options.add_to, motion=options.out)
     write = choose_writer(options.out, writers)
     if options.add_to:
         from ..library.folder.label_files import find_free_file

@@ -86,7 +86,7 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
     outputs = (options.out, options.provenance, options.ball, options.report)
     annotations = options.annotations or find_track_labels(options.track)
     check_outputs(*outputs, reserved=(options.track, annotations, options.pins, options.headings,
-                                      options.skeleton), library=options.library)
+                                      options.skeleton), library=options.library, motion=options.out)
     write = choose_writer(options.out, writers)
     track, data = clean_track(read_track_csv(options.track))
     timeline = read_timeline(annotations, options.fps, float(track.times[0])) if annotations else Timeline()

@@ -114,7 +114,8 @@ def run_synthesize(options, reporter: ProgressReporter, writers: Mapping[str, Wr
 
     started = time.perf_counter()
     inputs = (options.model, options.skeleton, options.track, options.annotations)
-    check_outputs(options.out, options.ball, options.report, reserved=inputs, library=options.library)
+    check_outputs(options.out, options.ball, options.report, reserved=inputs, library=options.library,
+                  motion=options.out)
     write = choose_writer(options.out, writers)
     _check_combination(options)
     model = _read_chosen_model(options)

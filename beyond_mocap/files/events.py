@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..base.errors import InputError, build_read_error
+from ..base.errors import InputError, build_read_error, describe_damage
 from ..motion.track.match_data import Match
 from .event_data import EventPlayer, MatchEvent, MatchEvents, assign_players
 from .event_providers import (
@@ -113,8 +113,18 @@ def _assign_players(path: Path, rows: list[tuple[MatchEvent, EventPlayer | None]
 
 
 def _load_kloppy_events(path: Path, provider: EventProvider, second: Path | None, match: Match | None):
-    """Load events with kloppy and convert them."""
+    """Load events with kloppy and convert them; InputError also for values that kloppy takes as they are."""
     dataset = load_events(path, provider, second)
+    try:
+        return _convert_events(dataset, provider, match)
+    except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError) as error:
+        found = describe_damage(error) + (f", in it or in {second.name}" if second else "")
+        step = "export them again" if second else "export it again"
+        raise InputError(path, found, f"events of {provider.title}", step) from None
+
+
+def _convert_events(dataset, provider: EventProvider, match: Match | None):
+    """Convert kloppy's events, with their players."""
     place = _build_position_map(dataset, match)
     rows = []
     for record in dataset.records:

@@ -19,6 +19,7 @@ import numpy as np
 
 from ..base.content import open_file
 from ..base.errors import InputError
+from ..base.memory import check_memory
 from .json_values import describe_value, parse_json
 
 HEADER = "header"
@@ -32,6 +33,7 @@ _READ_ERRORS = (zipfile.BadZipFile, zlib.error, struct.error, EOFError, OSError,
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 """Those of numpy; zipfile unpacks bzip2 and LZMA whole, of whatever size, before it looks at a limit."""
 _BLOCK = 1 << 18  # bytes that are unpacked at once
+_LARGE, _BYTES_PER_BYTE = 1e8, 2.0  # bytes of arrays; of memory for a byte of them: they are unpacked, and converted
 _MAX_START = 1 << 14  # bytes before an array's values; numpy's own limit is 10,000 and some
 _OWN_KINDS = "biufU"  # kinds of types in arrays of the program's own files
 
@@ -131,11 +133,16 @@ def name_file(path: str | os.PathLike) -> Iterator[None]:
 
 @contextmanager
 def _open_archive(source, kind: str, max_bytes: int, place: str = _WHOLE) -> Iterator[zipfile.ZipFile]:
-    """Open a zip whose members have a limited size, and translate what goes wrong while it is read."""
+    """Open a zip whose members have a limited size, for which memory is free, and translate what goes wrong while it is
+    read.
+    """
     try:
         with zipfile.ZipFile(source) as archive:
-            if sum(member.file_size for member in archive.infolist()) > max_bytes:
+            total = sum(member.file_size for member in archive.infolist())
+            if total > max_bytes:
                 raise InputError(place, f"its arrays have more than {max_bytes:,} bytes", kind, "choose another file")
+            if total > _LARGE:
+                check_memory(place, _BYTES_PER_BYTE * total, "cut it into shorter ones")
             yield archive
     except InputError:
         raise

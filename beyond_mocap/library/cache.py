@@ -32,6 +32,7 @@ from ..base.errors import InputError
 from ..base.user_folders import find_user_cache
 from ..files.atomic import ABANDONED_SECONDS, atomic_write, remove_abandoned
 from ..files.bvh import bvh
+from ..files.bvh.bvh_text import MAX_BYTES
 from ..files.motion_file import MotionWriter, divide_into_motions, map_array
 from ..motion.skeleton import Skeleton
 from .clip import Clip, RepairFigures
@@ -66,7 +67,8 @@ class SourceDigests:
         self._used: dict[str, list] = {}
 
     def digest(self, name: str, path: Path) -> str:
-        """Return the digest of a file's content as hex digits, "unreadable" if it cannot be read.
+        """Return the digest of a file's content as hex digits, "unreadable" if it cannot be read or is larger than any
+        recording may be.
 
         Args:
             name: of the file below the library.
@@ -78,7 +80,7 @@ class SourceDigests:
             self._used[name] = row
             return row[1]
         try:
-            found = byte_digest(read_bytes(path, "a file of the library"), size=64).hex()
+            found = byte_digest(read_bytes(path, "a file of the library", MAX_BYTES), size=64).hex()
         except InputError:
             return "unreadable"
         if stamp and max(stamp[1:3]) < now - _SETTLED:  # a file that just changed may change again within one tick

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .formats.samples import MatchSamples
 
 _META_ENDS = ("_meta", "_metadata", "")  # of metadata's names behind the tracking file's
+_MOST_PERIODS = 20  # in metadata; TRACAB lists five, and kloppy looks for each of them in every frame
 
 
 def find_feed(path: str | os.PathLike, meta: str | os.PathLike | None, provider: str | None) -> tuple[Feed, list[str]]:
@@ -82,6 +83,8 @@ def _check_second_file(feed: Feed) -> None:
         if read_head(path).lstrip()[:1] not in (b"<", b"{", b"[", b"\xff", b"\xfe"):  # the last two: UTF-16
             raise InputError(path, "neither XML nor JSON", f"the metadata of {feed.provider.title}",
                              "choose the metadata file")
+        if (count := len(re.findall(rb"<period\b", path.read_bytes(), re.I))) > _MOST_PERIODS:
+            raise InputError(path, f"{count} periods", "those of one match", "export it again")
 
 
 def _check_file(path: str | os.PathLike, kind: str = "a tracking file") -> Path:

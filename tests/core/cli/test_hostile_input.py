@@ -188,6 +188,20 @@ def test_no_output_becomes_labels_or_a_ball_of_a_library(name, run_line, tmp_pat
         check_outputs(table, top / "walk.txt", library=top, labels=top / "walk.txt")
 
 
+def test_no_report_becomes_a_recording_of_a_library(run_line, tmp_path):
+    library = tmp_path / "library"
+    library.mkdir()
+    (library / "walk.bvh").write_bytes(WALK.read_bytes())
+    for name in ("r.bvh", "r.BVH", "r.fbx"):
+        for command in ("library {library} --report {out}", "evaluate {clip} --library {library} --report {out}"):
+            line = command.format(library=library, out=library / name, clip=WALK)
+            status, answer = run_line(*line.split())
+            assert status == 2 and "would be read as a recording of the library" in answer
+            assert not (library / name).exists()
+    out = library / "new.bvh"
+    check_outputs(out, library / "r.json", tmp_path / "r.bvh", library=library, motion=out)
+
+
 def test_the_library_is_listed_once_for_all_outputs_that_exist(tmp_path, monkeypatch):
     outputs = [tmp_path / name for name in ("a.bvh", "b.json", "c.csv")]
     for path in outputs:

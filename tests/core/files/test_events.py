@@ -1,5 +1,6 @@
 """Events in: every provider's form through kloppy, plain tables, and whose they are."""
 
+import json
 import pathlib
 
 import numpy as np
@@ -68,6 +69,18 @@ def test_a_provider_s_feet_hands_and_heads_are_kept():
     assert {("pass", "foot", "right"), ("pass", "foot", "left"), ("pass", "head", ""), ("pass", "hand", "")} <= kinds
     throws = [event for event in events if "throw-in" in event.details]
     assert throws and all(event.part == "hand" for event in throws)
+
+
+def test_a_value_of_another_kind_that_kloppy_takes_is_refused_in_one_line(tmp_path):
+    names = "statsperform_event_ma3.json", "statsperform_event_ma1.json"
+    events, meta = (tmp_path / name for name in names)
+    events.write_bytes((files() / names[0]).read_bytes())
+    content = json.loads((files() / names[1]).read_text("utf-8"))
+    for player in content["liveData"]["lineUp"][0]["player"]:
+        player["shirtNumber"] = [1]
+    meta.write_text(json.dumps(content))
+    with pytest.raises(InputError, match=rf"of another kind, than expected, in it or in {meta.name}; expected events"):
+        read_events(events, meta)
 
 
 def test_a_second_file_that_is_missing_is_asked_for(tmp_path):

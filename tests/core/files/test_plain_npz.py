@@ -9,8 +9,9 @@ import zipfile
 import numpy as np
 import pytest
 
+from beyond_mocap.base import memory
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.files import piece_file
+from beyond_mocap.files import piece_file, plain_npz
 from beyond_mocap.files.piece_file import read_piece_file
 from beyond_mocap.files.plain_npz import read_named_arrays, read_own_arrays, read_plain_arrays
 from beyond_mocap.files.tracking import tracking
@@ -72,6 +73,21 @@ def test_an_archive_is_never_unpacked_beyond_its_limit(bombs, bomb, reader, monk
         most = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
     assert found is None and most < 4 * LIMIT
+
+
+@pytest.mark.parametrize("reader", ["own", "named", "plain"])
+def test_an_archive_that_needs_more_memory_than_is_free_is_refused_before_it_is_unpacked(reader, bombs, monkeypatch):
+    monkeypatch.setattr(plain_npz, "_LARGE", UNPACKED - 1)
+    monkeypatch.setattr(memory, "read_free_bytes", lambda: 1.9 * UNPACKED)
+    monkeypatch.setitem(globals(), "LIMIT", 2 * UNPACKED)
+    monkeypatch.setitem(READERS, "own", lambda path: read_own_arrays(path, "a file", LIMIT))
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError, match=r"this needs about \S+ GB, \S+ are free; cut it"):
+            READERS[reader](bombs["deflate"])
+        assert tracemalloc.get_traced_memory()[1] < 1e6
+    finally:
+        tracemalloc.stop()
 
 
 def test_arrays_come_back_as_they_were_written(tmp_path):

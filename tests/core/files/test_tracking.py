@@ -3,6 +3,7 @@
 import gc
 import os
 import pathlib
+import re
 import sys
 import types
 
@@ -174,6 +175,16 @@ def test_tracab_becomes_metres_and_is_kept(tmp_path, monkeypatch):
     assert again.players == match.players and again.periods == match.periods
     for name in ("times", "positions", "ball"):
         np.testing.assert_array_equal(getattr(again, name), getattr(match, name))
+
+
+def test_a_period_that_is_listed_again_and_again_is_refused(tmp_path):
+    """kloppy looks for each in every frame: 2000 rows of one period took more than a minute."""
+    pytest.importorskip("kloppy")
+    file, _ = made_tracab(tmp_path)
+    meta = next(tmp_path.glob("*.xml"))
+    meta.write_text(re.sub(r"<period [^>]*/>", lambda found: 30 * found[0], meta.read_text(), count=1))
+    with pytest.raises(InputError, match=rf"{meta.name}: \d+ periods; expected those of one match"):
+        read_match(file, cache_dir=tmp_path / "cache")
 
 
 def test_frames_of_a_match_are_gone_once_it_is_read(tmp_path):

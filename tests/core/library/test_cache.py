@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tracemalloc
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,6 +16,7 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files import motion_file
+from beyond_mocap.files.bvh.bvh_text import MAX_BYTES
 from beyond_mocap.library import build, cache, read_clips, synthetic_clips
 from beyond_mocap.library import library as library_module
 from beyond_mocap.library.build import build_library
@@ -293,6 +295,19 @@ def test_a_file_that_changes_within_its_clock_tick_is_read_again(folder):
     (folder / "walk.bvh").write_bytes((folder / "walk.bvh").read_bytes().replace(b"0", b"1", 1))
     os.utime(folder / "walk.bvh", (1e9, 1e9))  # size and time of content are as before
     assert cache.SourceDigests(folder / CACHE_FOLDER).digest("walk.bvh", folder / "walk.bvh") != fresh
+
+
+def test_a_file_that_no_recording_can_be_is_not_read_for_its_digest(folder):
+    """A file of 20 GB was read for two minutes before the build said what it needs."""
+    place = folder / "huge.bvh"
+    with open(place, "wb") as file:
+        file.truncate(MAX_BYTES + 1)
+    tracemalloc.start()
+    try:
+        assert cache.SourceDigests(folder / CACHE_FOLDER).digest(place.name, place) == "unreadable"
+        assert tracemalloc.get_traced_memory()[1] < 1e6
+    finally:
+        tracemalloc.stop()
 
 
 def test_built_in_files_or_in_memory_gives_the_same_bits(folder, monkeypatch):
