@@ -8,7 +8,7 @@ motion.
 
 A foot rolls: first the heel carries it, then the toe, on which the heel rises while it is still low and slow. Where a
 leg does not reach, people rise on their toes; so does the foot here, then the pelvis is lowered, then the stance is
-shortened at its ends, then the foot slides.
+shortened at its ends, then the foot slides around the frames that are out of reach.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ MAX_DROP, MAX_HEEL_RISE = 0.04, 0.35
 HOLD_WEIGHT = 1e6
 """Weight of a shift that is given: so much larger than all others that it stays."""
 
-MAX_SHIFT = 0.25
+MAX_SHIFT = 0.4
 EASE_DISTANCE, RESERVE, AIR_RESERVE = 0.012, 0.004, 0.02
 """Metres below full length from which a leg eases (`limb.soften_distance`), and reserves of length that are left in
 contact and in the air: a leg that is nearly straight pops at the knee. A leg that was straighter in the recording may
@@ -57,7 +57,7 @@ TRIM_SECONDS = 0.1
 SLIDE_TOLERANCE = 0.004
 """Metres that a leg may be too short for its foot without its stance being relaxed."""
 
-_RELAX_ROUNDS = 3  # rounds of relaxing the contact weights
+_RELAX_ROUNDS = 4  # rounds of relaxing the contact weights
 _SPREAD_FRAMES = 3  # frames at 30 per second over which a rise or drop is spread
 
 
@@ -331,15 +331,15 @@ def _trim_stances(weight: np.ndarray, planted: np.ndarray, short: np.ndarray, fp
 
 
 def relax_contact_weights(weight: np.ndarray, excess: np.ndarray) -> np.ndarray:
-    """Relax the weights (T, 2) of those stances in which `excess` (T,) metres is above 0: to a third or less at 10 cm.
+    """Relax the weights (T, 2) of a stance around the frames in which `excess` (T,) metres is above 0: to a third or
+    less at 10 cm.
+
+    The rest of the stance keeps its weight: the excess is mostly at the ends, and a foot that slides there for some
+    frames as it lands or leaves is seen less than one that slides for a whole stance.
     """
     stance = weight.max(axis=1) > 0
-    # label numbers the stances from 1; frames without contact have 0 and collect nothing
-    label = number_runs(stance)
-    worst = np.zeros(label.max(initial=0) + 1)
-    for first, end in find_runs(stance):
-        worst[label[first]] = max(excess[first:end].max(), 0.0)
-    return weight / (1.0 + worst[label] / 0.02)[:, None] ** 2
+    near = compute_running_maximum(np.where(stance, np.maximum(excess, 0.0), 0.0), 1, 1) * stance
+    return weight / (1.0 + near / 0.02)[:, None] ** 2
 
 
 def _measure_firmness(is_planted: np.ndarray, scale: float) -> np.ndarray:

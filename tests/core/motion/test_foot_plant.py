@@ -7,7 +7,7 @@ import pytest
 
 from beyond_mocap.base.time_series import find_runs
 from beyond_mocap.motion import contacts
-from beyond_mocap.motion.foot_plant import MAX_DROP, plant_feet, solve_shift
+from beyond_mocap.motion.foot_plant import MAX_DROP, MAX_SHIFT, plant_feet, solve_limited_shift, solve_shift
 from beyond_mocap.motion.humanoid import identify_joints, measure_leg_length
 from beyond_mocap.motion.limb import solve_two_bone
 from beyond_mocap.motion.motion import compute_local_rotations, compute_pose, place_motion
@@ -191,6 +191,14 @@ def test_the_shift_cancels_velocity_where_it_has_weight_and_is_gentle_elsewhere(
     assert np.allclose(np.diff(found)[22:37], -0.01, atol=1e-3) and np.allclose(np.diff(found)[62:77], -0.01, atol=1e-3)
     assert np.abs(np.diff(found, 3)).max() < 0.02 and np.abs(found).max() < 0.25
     assert np.allclose(solve_shift(velocity, weight * 0.0), 0.0)
+
+
+def test_a_stance_that_drags_too_far_slides_at_its_ends_alone():
+    velocity, weight = np.zeros((89, 2, 2)), np.zeros((90, 2))
+    velocity[30:60, :, 0], weight[30:61] = 0.035, [0.2, 1.0]  # a metre within a second
+    shift, _ = solve_limited_shift(velocity, weight, scale=1.0)
+    slide = np.abs(np.diff(shift, axis=0) + velocity[:, 1])[:, 0]
+    assert slide[38:52].max() < 2e-3 and np.abs(shift[30:61]).max() < 1.1 * MAX_SHIFT
 
 
 def test_a_given_shift_is_reached_and_kept_while_the_foot_stands():
