@@ -331,15 +331,19 @@ def _trim_stances(weight: np.ndarray, planted: np.ndarray, short: np.ndarray, fp
 
 
 def relax_contact_weights(weight: np.ndarray, excess: np.ndarray) -> np.ndarray:
-    """Relax the weights (T, 2) of a stance around the frames in which `excess` (T,) metres is above 0: to a third or
-    less at 10 cm.
+    """Relax the weights (T, 2) of stances in which `excess` (T,) metres is above 0: to a third or less at 10 cm.
 
-    The rest of the stance keeps its weight: the excess is mostly at the ends, and a foot that slides there for some
-    frames as it lands or leaves is seen less than one that slides for a whole stance.
+    Where at most half of a stance has an excess, it is relaxed around those frames alone. They are mostly its ends, and
+    a foot that slides as it lands or leaves is seen less than one that slides for a whole stance. Of a stance that is
+    dragged along for most of its time hardly anything could be held: it slides evenly.
     """
-    stance = weight.max(axis=1) > 0
-    near = compute_running_maximum(np.where(stance, np.maximum(excess, 0.0), 0.0), 1, 1) * stance
-    return weight / (1.0 + near / 0.02)[:, None] ** 2
+    relaxed = weight.copy()
+    for first, end in find_runs(weight.max(axis=1) > 0):
+        over = np.maximum(excess[first:end], 0.0)
+        is_local = np.count_nonzero(over) <= 0.5 * len(over)
+        over = compute_running_maximum(over, 1, 1) if is_local else np.full(len(over), over.max())
+        relaxed[first:end] /= (1.0 + over / 0.02)[:, None] ** 2
+    return relaxed
 
 
 def _measure_firmness(is_planted: np.ndarray, scale: float) -> np.ndarray:
