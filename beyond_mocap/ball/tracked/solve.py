@@ -15,6 +15,7 @@ import numpy as np
 
 from ...base.errors import InputError, UserCancelledError
 from ...base.time_series import interpolate_columns
+from ...base.vectors import measure_lengths
 from ...motion.skeleton import freeze_array
 from ...motion.track import BALL_RADIUS, Track
 from ...motion.track.match_data import REFEREE, Match
@@ -149,7 +150,8 @@ def solve_samples(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, pl
                                                      ends=ends)))
     solved = [_update_touch(touch, path, heights) for touch in solved]
     ends = find_ball_ends(samples.times, path.at(samples.times), *pitch)
-    solved = _label_throw_ins(solved, ends, pitch)
+    speeds = _measure_player_speeds(samples, positions, players, solved)
+    solved = _label_throw_ins(solved, ends, speeds, pitch)
     residuals = np.where(samples.known, path.residuals(samples.times, samples.positions), np.nan)
     confidence = float(np.mean([touch.confidence for touch in solved])) if solved else 0.0
     return SolvedBall(times=samples.times, touches=tuple(solved), ball=path, filled=samples.filled,
@@ -284,7 +286,7 @@ def _label_touches(samples, found, positions, players, teams, pitch, untracked_c
         same_before = k > 0 and chosen[k - 1] == player and time[k] - time[k - 1] < 3.0
         kind = kinds.choose_touch_kind(part, before[k] - moving, after[k] - moving, same_next, same_before)
         since = time[k] - time[k - 1] if k else np.inf
-        if kinds.is_throw_in(place[k], before[k], after[k], since, pitch):
+        if kinds.is_throw_in(place[k], before[k], after[k], since, speed=measure_lengths(moving), pitch=pitch):
             part, kind = "hand", kinds.THROW_IN
         elif player in goals:
             part, kind = kinds.choose_keeper_kind(place[k], before[k], goals[player], known_height) or (part, kind)
@@ -321,14 +323,15 @@ def find_goal_lines(positions: np.ndarray, teams: Sequence[str], length: float) 
     return {keeper: float(np.sign(x)) * length / 2.0 for keeper, x in places.items() if abs(x) > length / 5.0}
 
 
-def _label_throw_ins(solved: list[SolvedTouch], ends: list[BallEnd],
+def _label_throw_ins(solved: list[SolvedTouch], ends: list[BallEnd], speeds: Sequence[float],
                      pitch: tuple[float, float]) -> list[SolvedTouch]:
-    """Label throw-ins: the first touch from the touch line after each ball over it."""
+    """Label throw-ins: the first touch from the touch line after each ball over it; speeds (K,) m/s of the players."""
     out = list(solved)
     for end in ends:
         later = [k for k, touch in enumerate(solved) if end.time < touch.time < end.time + _RESTART]
         takes = (k for k in later if out[k].position[1] * end.y > 0.0)
-        first = next((k for k in takes if kinds.is_from_touch_line(out[k].position, out[k].after, pitch)), None)
+        first = next((k for k in takes if kinds.is_from_touch_line(out[k].position, out[k].after, speeds[k],
+                                                                   pitch)), None)
         if end.kind == "touch line" and first is not None:
             out[first] = replace(out[first], part="hand", kind=kinds.THROW_IN)
     return out
@@ -371,6 +374,15 @@ def _measure_mean_distance(samples: Samples, positions: np.ndarray, time: np.nda
     # Differences of the cumulative sums give the mean between two touches.
     before = np.concatenate([[0], at[:-1]])
     return (total[:, at] - total[:, before]) / np.maximum(count[:, at] - count[:, before], 1)
+
+
+def _measure_player_speeds(samples: Samples, positions: np.ndarray, players: Sequence[str],
+                           solved: Sequence[SolvedTouch]) -> list[float]:
+    """Measure the speed in m/s of the player of each touch; 0 where there is none."""
+    known = [np.flatnonzero(np.isfinite(path[:, 0])) for path in positions]
+    numbers = {player: number for number, player in enumerate(players)}
+    return [float(measure_lengths(_estimate_player_velocity(samples, positions, known, numbers.get(touch.player, -1),
+                                                            time=touch.time))) for touch in solved]
 
 
 def _estimate_player_velocity(samples: Samples, positions: np.ndarray, known: Sequence[np.ndarray], player: int,

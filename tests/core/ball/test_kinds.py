@@ -76,7 +76,8 @@ def test_keepers_are_those_who_stand_deepest():
 ])  # fmt: skip
 def test_a_throw_leaves_the_touch_line_inward_not_from_a_corner_and_no_faster_than_a_person_throws(place, after,
                                                                                                    is_thrown):
-    assert is_from_touch_line(np.array(place), np.array(after), (105.0, 68.0)) == is_thrown
+    assert is_from_touch_line(np.array(place), np.array(after), 1.0, (105.0, 68.0)) == is_thrown
+    assert not is_from_touch_line(np.array(place), np.array(after), 5.0, (105.0, 68.0))  # kept in at a run
 
 
 def test_the_ball_over_the_touch_line_comes_back_by_a_throw_in():
