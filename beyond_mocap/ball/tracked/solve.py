@@ -286,7 +286,8 @@ def _label_touches(samples, found, positions, players, teams, pitch, untracked_c
         same_before = k > 0 and chosen[k - 1] == player and time[k] - time[k - 1] < 3.0
         kind = kinds.choose_touch_kind(part, before[k] - moving, after[k] - moving, same_next, same_before)
         since = time[k] - time[k - 1] if k else np.inf
-        if kinds.is_throw_in(place[k], before[k], after[k], since, speed=measure_lengths(moving), pitch=pitch):
+        if kinds.is_throw_in(place[k], before[k], after[k], since, speed=float(measure_lengths(moving)),
+                             pitch=pitch):
             part, kind = "hand", kinds.THROW_IN
         elif player in goals:
             part, kind = kinds.choose_keeper_kind(place[k], before[k], goals[player], known_height) or (part, kind)
