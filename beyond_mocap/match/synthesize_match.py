@@ -19,6 +19,7 @@ import numpy as np
 from ..appearance.sports import FOOTBALL, load_sports
 from ..ball.tracked.solve import SolvedBall, solve_ball
 from ..base.errors import BeyondMocapError, InputError, UserCancelledError
+from ..base.memory import check_memory
 from ..files.atomic import atomic_write
 from ..files.event_data import MatchEvents
 from ..files.events import read_events
@@ -55,6 +56,11 @@ from .request import MatchRequest, build_identity
 from .roles import Role, build_roles, list_absent_players, resolve_span, separate_roles
 from .seen_touches import name_seen_touches
 from .state import MatchState, build_player_row, build_state, read_clocks
+
+_PLAYER_BYTES, _WORKER_BYTES, _FIGURE_BYTES, _LONGEST_STRETCH = 8e3, 0.4e9, 0.12e6, 3000.0
+"""Bytes of the main process for each second of a player; of a worker; and of a worker for each second of the longest
+stretch, a half, whose figures it measures. Fitted to the halves and matches of docs/explanation/limits.md, rather below
+than above: not all are needed at the same time."""
 
 BALL_MARGIN = 5.0
 """s before and after the span in which the ball is solved too."""
@@ -129,6 +135,7 @@ def synthesize_match(
     report(0.0, f"Reading {request.tracking.name}")
     match, feed = read_tracked(request)
     span = resolve_span(match, request)
+    _check_memory(request, len(request.players or match.players), span)
     events = None if request.events is None else read_events(request.events, request.events_meta,
                                                              request.events_provider or None, match)
     read = read_clocks()
@@ -153,6 +160,14 @@ def synthesize_match(
             if not request.scheduler:
                 stop_workers()
     return read_result(request)
+
+
+def _check_memory(request: MatchRequest, players: int, span: tuple[float, float]) -> None:
+    """Check that the memory for the players of a span, (first, last) s, is free; InputError where it is not."""
+    seconds = span[1] - span[0]
+    worker = _WORKER_BYTES + (_FIGURE_BYTES * min(seconds, _LONGEST_STRETCH) if request.figures else 0.0)
+    needed = _PLAYER_BYTES * players * seconds + worker * (0 if request.scheduler else request.workers)
+    check_memory(request.tracking, needed, "use fewer workers, or a shorter part of the match")
 
 
 def _build_library(request: MatchRequest, report: Progress, cancelled) -> tuple[Library, LibrarySource]:

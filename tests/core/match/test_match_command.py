@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from beyond_mocap.base import memory
 from beyond_mocap.cli.matching import remove_option
 from beyond_mocap.match.folder import read_state
 from tests.core.match.small_match import LIBRARY, SMALL
@@ -35,6 +36,13 @@ def test_a_player_and_the_ball(match, tmp_path):
     assert read_state(tmp_path / "out")["status"] == "done"
     status, _, error = match("--no-figures", to=7)
     assert status == 2 and "holds the results of another request (its end time differs)" in error[0]
+
+
+def test_a_match_that_needs_more_memory_than_is_free_is_refused_before_it_begins(match, tmp_path, monkeypatch):
+    monkeypatch.setattr(memory, "read_free_bytes", lambda: 1e9)
+    status, _, error = match(workers=4)
+    assert status == 2 and "small.dat: this needs about 1.6 GB, 1.0 are free; use fewer workers, or a" in error[-1]
+    assert not (tmp_path / "out" / "match.json").exists()
 
 
 def test_without_solved_touches_there_are_no_words(match, tmp_path):
