@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..base.errors import InputError, build_read_error, describe_damage
+from ..base.errors import InputError, build_read_error
 from ..motion.track.match_data import Match
 from .event_data import EventPlayer, MatchEvent, MatchEvents, assign_players
 from .event_providers import (
@@ -21,6 +21,7 @@ from .event_providers import (
     find_second_file,
     load_events,
 )
+from .tracking.feed import refuse_damage
 from .tracking.match_repairs import find_home_end
 
 _MIN_KNOWN_SHARE = 0.5  # smallest share of the events' players that must be tracked
@@ -115,12 +116,8 @@ def _assign_players(path: Path, rows: list[tuple[MatchEvent, EventPlayer | None]
 def _load_kloppy_events(path: Path, provider: EventProvider, second: Path | None, match: Match | None):
     """Load events with kloppy and convert them; InputError also for values that kloppy takes as they are."""
     dataset = load_events(path, provider, second)
-    try:
+    with refuse_damage(path, f"events of {provider.title}", () if second is None else (second,)):
         return _convert_events(dataset, provider, match)
-    except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError) as error:
-        found = describe_damage(error) + (f", in it or in {second.name}" if second else "")
-        step = "export them again" if second else "export it again"
-        raise InputError(path, found, f"events of {provider.title}", step) from None
 
 
 def _convert_events(dataset, provider: EventProvider, match: Match | None):

@@ -43,6 +43,9 @@ HOLD_WEIGHT = 1e6
 """Weight of a shift that is given: so much larger than all others that it stays."""
 
 MAX_SHIFT = 0.4
+"""Metres that a foot is moved over the ground in contact, at most. Legs hardly reach further: 0.6 gives the same
+figures. At 0.25, 9 instead of 6 of 1,513 stances travel more than 6 cm."""
+
 EASE_DISTANCE, RESERVE, AIR_RESERVE = 0.012, 0.004, 0.02
 """Metres below full length from which a leg eases (`limb.soften_distance`), and reserves of length that are left in
 contact and in the air: a leg that is nearly straight pops at the knee. A leg that was straighter in the recording may

@@ -138,8 +138,8 @@ def solve_samples(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, pl
         if progress is not None:
             progress(0.6 * number / len(windows), "touches")
         found.append(_solve_window(samples, window, positions, untracked_cost))
-    solved = _label_touches(samples, found, positions, players=players, teams=teams, pitch=pitch,
-                            untracked_cost=untracked_cost)
+    solved, speeds = _label_touches(samples, found, positions, players=players, teams=teams, pitch=pitch,
+                                    untracked_cost=untracked_cost)
     curves = [piece for window, cuts in zip(windows, found) for piece in _build_pieces(samples, window, cuts)]
     if progress is not None:
         progress(0.6, "flights")
@@ -150,7 +150,6 @@ def solve_samples(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, pl
                                                      ends=ends)))
     solved = [_update_touch(touch, path, heights) for touch in solved]
     ends = find_ball_ends(samples.times, path.at(samples.times), *pitch)
-    speeds = _measure_player_speeds(samples, positions, players, solved)
     solved = _label_throw_ins(solved, ends, speeds, pitch)
     residuals = np.where(samples.known, path.residuals(samples.times, samples.positions), np.nan)
     confidence = float(np.mean([touch.confidence for touch in solved])) if solved else 0.0
@@ -259,15 +258,16 @@ def _build_piece(samples: Samples, at: np.ndarray, places: np.ndarray, speeds: n
     return replace(piece, kind=kind, residual=residual)
 
 
-def _label_touches(samples, found, positions, players, teams, pitch, untracked_cost) -> list[SolvedTouch]:
-    """Label the touches with their players, parts and kinds."""
+def _label_touches(samples, found, positions, players, teams, pitch, untracked_cost) -> tuple[list[SolvedTouch],
+        list[float]]:
+    """Label the touches with their players, parts and kinds; returns the players' speeds in m/s too."""
     fields = ("time", "spread", "margin", "place", "before", "after")
     rows = [tuple(_pad_to_three(getattr(cuts, name)[cuts.touch]) for name in fields) for cuts in found]
     columns = [np.concatenate(column) for column in zip(*rows)]
     order = np.argsort(columns[0], kind="stable")
     time, spread, margin, place, before, after = (column[order] for column in columns)
     if not len(time):
-        return []
+        return [], []
     away = touches.measure_player_distances(samples.times, place[:, :2], positions, time)
     chosen = touches.choose_players(away, time, _measure_mean_distance(samples, positions, time), untracked_cost)
     all_tracked, known_height = np.isfinite(away).sum(axis=0) >= _FULL_TRACKING, _has_heights(samples)
@@ -277,17 +277,17 @@ def _label_touches(samples, found, positions, players, teams, pitch, untracked_c
     before, after, away, chosen = before[kept], after[kept], away[:, kept], chosen[kept]
     goals = find_goal_lines(positions, teams, pitch[0])
     known = [np.flatnonzero(np.isfinite(path[:, 0])) for path in positions]
-    out = []
+    out, speeds = [], []
     for k in range(len(time)):
         player = int(chosen[k])
         moving = _estimate_player_velocity(samples, positions, known, player, time=time[k])
+        speeds.append(float(measure_lengths(moving)))
         part = kinds.choose_part(place[k, 2] if known_height else None)
         same_next = k + 1 < len(time) and chosen[k + 1] == player and time[k + 1] - time[k] < 3.0
         same_before = k > 0 and chosen[k - 1] == player and time[k] - time[k - 1] < 3.0
         kind = kinds.choose_touch_kind(part, before[k] - moving, after[k] - moving, same_next, same_before)
         since = time[k] - time[k - 1] if k else np.inf
-        if kinds.is_throw_in(place[k], before[k], after[k], since, speed=float(measure_lengths(moving)),
-                             pitch=pitch):
+        if kinds.is_throw_in(place[k], before[k], after[k], since, speed=speeds[k], pitch=pitch):
             part, kind = "hand", kinds.THROW_IN
         elif player in goals:
             part, kind = kinds.choose_keeper_kind(place[k], before[k], goals[player], known_height) or (part, kind)
@@ -296,7 +296,7 @@ def _label_touches(samples, found, positions, players, teams, pitch, untracked_c
         name = players[player] if player >= 0 else ""
         out.append(SolvedTouch(time=float(time[k]), uncertainty=float(spread[k]), player=name, part=part, kind=kind,
                                position=centre, before=before[k], after=after[k], confidence=confidence))
-    return out
+    return out, speeds
 
 
 def _describe_feed(samples: Samples, heights: bool) -> tuple[str, ...]:
@@ -375,15 +375,6 @@ def _measure_mean_distance(samples: Samples, positions: np.ndarray, time: np.nda
     # Differences of the cumulative sums give the mean between two touches.
     before = np.concatenate([[0], at[:-1]])
     return (total[:, at] - total[:, before]) / np.maximum(count[:, at] - count[:, before], 1)
-
-
-def _measure_player_speeds(samples: Samples, positions: np.ndarray, players: Sequence[str],
-                           solved: Sequence[SolvedTouch]) -> list[float]:
-    """Measure the speed in m/s of the player of each touch; 0 where there is none."""
-    known = [np.flatnonzero(np.isfinite(path[:, 0])) for path in positions]
-    numbers = {player: number for number, player in enumerate(players)}
-    return [float(measure_lengths(_estimate_player_velocity(samples, positions, known, numbers.get(touch.player, -1),
-                                                            time=touch.time))) for touch in solved]
 
 
 def _estimate_player_velocity(samples: Samples, positions: np.ndarray, known: Sequence[np.ndarray], player: int,

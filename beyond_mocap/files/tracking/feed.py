@@ -9,14 +9,14 @@ import logging
 import os
 import re
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 from xml.parsers import expat
 
 from ...base import optional_packages
-from ...base.errors import InputError, build_read_error
+from ...base.errors import InputError, build_read_error, describe_damage
 
 MAX_PLAYERS = 60
 """Two squads of 26 and the referees have fewer; more are two matches in one file."""
@@ -191,6 +191,25 @@ def load_with_kloppy(path: Path, provider: str, loader: str, arguments: Mapping,
         reason = _find_syntax_error(arguments.values()) or (str(error)[:120] if is_plain else "")
         found = f"not readable as {expected}" + (f" ({reason})" if reason else "")
         raise InputError(path, found, f"{expected}{others}", "check the files, and the provider") from None
+
+
+@contextlib.contextmanager
+def refuse_damage(path: Path, expected: str, others: Sequence[Path] = ()) -> Iterator[None]:
+    """Context manager: values of another kind, which kloppy takes as they are, end in one line.
+
+    Args:
+        path: the file, for errors.
+        expected: what it should be.
+        others: the files that belong to it, in which the damage may be.
+    Raises:
+        InputError: where what is done with the values fails.
+    """
+    try:
+        yield
+    except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError) as error:
+        where = f", in it or in {' or '.join(one.name for one in others)}" if others else ""
+        step = "export them again" if others else "export it again"
+        raise InputError(path, describe_damage(error) + where, expected, step) from None
 
 
 @contextlib.contextmanager

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from ...base.content import open_file
-from ...base.errors import InputError, describe_damage, format_count
+from ...base.errors import InputError, format_count
 from ...base.user_folders import find_user_cache
 from ...motion.skeleton import freeze_array
 from ...motion.track import Track
@@ -28,7 +28,7 @@ from ..plain_npz import read_own_arrays
 from ..tables import parse_number, read_rows
 from . import match_arrays
 from .body_angles import find_headings
-from .feed import Feed
+from .feed import Feed, refuse_damage
 from .formats.samples import MatchSamples
 from .match_repairs import (
     check_periods,
@@ -155,16 +155,12 @@ def _read_arrays(feed: Feed, pitch: tuple[float, float] | None) -> dict[str, np.
 
 def _read_samples(feed: Feed, pitch: tuple[float, float] | None, whose: Feed | None = None) -> MatchSamples:
     """Read the samples of a match; with copies of files, `whose` are the user's."""
-    try:
+    with refuse_damage(feed.path, f"{feed.provider.title} tracking", feed.meta):
         if feed.provider.read_samples is not None:
             return feed.provider.read_samples(feed, pitch)
         samples = _convert_dataset(load_tracking(feed, pitch or match_arrays.USUAL_PITCH), whose or feed, pitch)
         gc.collect()  # kloppy's frames refer to each other in circles: 1.3 GB of a match
         return samples
-    except (LookupError, TypeError, AttributeError, ValueError, ArithmeticError) as error:
-        others = f", in it or in {' or '.join(one.name for one in feed.meta)}" if feed.meta else ""
-        step = "export them again" if feed.meta else "export it again"
-        raise InputError(feed.path, describe_damage(error) + others, f"{feed.provider.title} tracking", step) from None
 
 
 def _convert_dataset(dataset, feed: Feed, pitch: tuple[float, float] | None) -> MatchSamples:
